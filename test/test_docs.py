@@ -238,7 +238,7 @@ def test_messages_that_are_quoted_exist() -> None:
 def test_a_made_up_quote_would_be_noticed() -> None:
     texts = spoken()
     assert is_spoken("the brightness of the whole scene has changed", texts)
-    assert not is_spoken("the whole scene turned upside down", texts)
+    assert not is_spoken("the whole scene turned into a lake", texts)
     assert not is_spoken("every camera dreams of electric sheep", texts)
 
 

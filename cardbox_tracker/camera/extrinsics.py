@@ -20,6 +20,8 @@ FARTHEST_M = 30.0
 _ROTATION_TOLERANCE = 1e-2
 # Largest plausible length, even in millimetres; sums of such numbers stay finite.
 _LARGEST = 1e6
+# Lenses have at least this distance, metres.
+_NEAREST_M = 0.005
 # Cosine of the angle between optical axes that hardly meet.
 _PARALLEL = 0.99
 
@@ -101,6 +103,15 @@ class Extrinsics:
         """Return the angle between the rotations, rad, and the distance of the centres, metres."""
         angle = angle_of(self.rotation @ other.rotation.T)
         return angle, float(np.linalg.norm(self.centre_m - other.centre_m))
+
+    def check(self) -> None:
+        """Raise CameraError if the cameras stand at the same place."""
+        if np.linalg.norm(self.translation_m) < _NEAREST_M:
+            raise CameraError(
+                f"{self.source or 'the extrinsics'}: two cameras stand at the same place, as none "
+                "do, so the pose is a placeholder; expected the measured one, in metres: give "
+                "--extrinsics FILE, which 'cardbox calibrate-extrinsics' writes"
+            )
 
     def __str__(self) -> str:
         angle = np.degrees(angle_of(self.rotation))

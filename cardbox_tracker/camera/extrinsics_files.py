@@ -141,7 +141,7 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
     """Return the first extrinsics that are present: from P, from ``/tf_static``, or from a file.
 
     Raises CameraError if there are none, if two differ by more than a degree or two centimetres, or
-    if the cameras ``first`` and ``other`` are more than 30 m apart.
+    if the cameras ``first`` and ``other`` are at one place or more than 30 m apart.
     """
     there = [extrinsics for extrinsics in found if extrinsics is not None]
     if not there:
@@ -151,6 +151,7 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
             "on /tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
             "nodes extrinsics_file"
         )
+    there[0].check()
     apart_m = float(np.linalg.norm(there[0].centre_m))
     if not apart_m <= FARTHEST_M:
         raise CameraError(

@@ -67,9 +67,10 @@ class View:
     def of(cls, body: BodyModel, first: Camera, other: OtherCamera) -> View:
         """Return the view of ``body`` before ``first``, which includes its pitch.
 
-        Raises CameraError if the other camera looks straight up or down, or does not have the
-        person in front of it.
+        Raises CameraError if the other camera looks straight up or down, stands where the first one
+        does, or does not have the person in front of it.
         """
+        other.extrinsics.check()
         axes = other.extrinsics.rotation @ first.reference_to_optical_rotation()
         ahead = axes[2]
         pitch_rad = asin(min(max(-float(ahead[2]), -1.0), 1.0))

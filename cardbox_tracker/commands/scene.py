@@ -22,6 +22,7 @@ from cardbox_tracker.measuring.scene_camera import (
     degrees_of,
     in_scene,
     lens_of,
+    other_lens,
     scene_camera,
 )
 from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
@@ -41,6 +42,8 @@ from cardbox_tracker.search.config import TrackerConfig
 # Relative difference of the distances of a person who stands where the scene has them, and
 # deviations beyond which people contradict a scene.
 _SAME_PLACE, _CONTRADICTS = 0.15, 3.0
+# Deviations of the camera's height by the floor that decide between a lens and a place.
+_SURE = 2.0
 
 
 @contextmanager
@@ -149,9 +152,7 @@ def _again(
     wrong = _contradiction(watched, bodies, scene.camera, camera)
     if wrong:
         print_remarks([f"{person.model}: {wrong}"])
-        doubt = {"camera_contradiction": "people contradict the given scene"}
-        unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
-        bodies = [body.with_values(pitch_stddev_rad=unsure, **doubt) for body in bodies]
+        bodies = _doubted(bodies, scene)
     guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
     if chosen is not None and chosen.number is not None:
         placed = seen_people(source, guesses, config, 0, seed, *span, only=chosen.number)
@@ -165,16 +166,53 @@ def _again(
         body if body is not None and _is_near(body, there) else there
         for body, there in zip_longest(bodies[: len(placed)], placed)
     ]
+    away = max((_away(*pair) for pair in zip(bodies, placed, strict=False)), key=abs, default=0.0)
+    if not wrong and abs(away) >= _SAME_PLACE:
+        seen = watched.people, _statures_m(watched, bodies), camera
+        by_floor = other_lens(*seen, scene.camera, away)
+        words = (
+            f"{person.model}: somebody is {math.exp(away):.2f} times as far away as in the scene"
+        )
+        if by_floor > _SURE:
+            more = (
+                ", and by the floor it is of another lens or person, so every posture is at best "
+            )
+            print_remarks([words + more + "uncertain; leave --scene out"])
+            kept = _doubted(kept, scene)
+        elif by_floor > -_SURE:
+            more = ": they stand elsewhere, or it is of another lens or person, so places are "
+            print_remarks(
+                [words + more + "uncertain; give --fov and --stature in place of --scene"]
+            )
+            unsure = math.hypot(camera.focal_stddev, away)
+            source.first.camera = replace(camera, focal_stddev=unsure)
     return Scene(scene.camera, tuple(kept)), chosen
+
+
+def _doubted(bodies: Sequence[BodyModel], scene: Scene) -> list[BodyModel]:
+    """Return bodies of whom nothing is sure."""
+    doubt = {"camera_contradiction": "people contradict the given scene"}
+    unsure = math.hypot(scene.camera.pitch_rad.stddev, FOUND_STDDEV)
+    return [body.with_values(pitch_stddev_rad=unsure, **doubt) for body in bodies]
+
+
+def _away(body: BodyModel, there: BodyModel) -> float:
+    """Return the logarithm of how much farther a body is seen; 0 if that is not known."""
+    if body.unknown or "distance_m" in there.unknown:
+        return 0.0
+    return math.log(there.placement.distance_m / body.placement.distance_m)
 
 
 def _is_near(body: BodyModel, there: BodyModel) -> bool:
     """Return whether a body that is wholly known is where it is seen, or is not seen."""
-    if body.unknown:
-        return False
-    if "distance_m" in there.unknown:
-        return True
-    return abs(math.log(body.placement.distance_m / there.placement.distance_m)) < _SAME_PLACE
+    return not body.unknown and abs(_away(body, there)) < _SAME_PLACE
+
+
+def _statures_m(watched: Watched, bodies: Sequence[BodyModel]) -> list[float]:
+    """Return the stature of each person who was watched; further ones have that of the last."""
+    statures_m = [stature_of(body_parts(body.sizes)) for body in bodies]
+    people = len(watched.people)
+    return [*statures_m, *statures_m[-1:] * people][:people]
 
 
 def _contradiction(
@@ -183,15 +221,16 @@ def _contradiction(
     """Return what people and edges of the room show of the camera if it is not the given one."""
     if not watched.people:
         return ""
-    people = len(watched.people)
-    statures_m = [stature_of(body_parts(body.sizes)) for body in bodies]
-    statures_m = [*statures_m, *statures_m[-1:] * people][:people]
+    statures_m = _statures_m(watched, bodies)
     found = scene_camera(watched.people, watched.pictures, camera, statures_m, None, 0.0).camera
-    shown = [(given.pitch_rad, found.pitch_rad)]
-    of_height = ""
+    shown, lens, more = [(given.pitch_rad, found.pitch_rad)], lens_of(camera), ""
+    if lens.origin == GIVEN:
+        shown.append((given.fov_rad, lens))
+        fovs_deg = (math.degrees(one.mean) for one in (lens, given.fov_rad))
+        more = ", a field of view of {:.0f} degrees, not {:.0f}".format(*fovs_deg)
     if given.height_m is not None and found.height_m is not None:
         shown.append((given.height_m, found.height_m))
-        of_height = f" and a height of {found.height_m.mean:.2f} m, not {given.height_m.mean:.2f}"
+        more += f" and a height of {found.height_m.mean:.2f} m, not {given.height_m.mean:.2f}"
     # Independent sources; what nothing shows contradicts nothing.
     apart = [
         (one.mean - other.mean) / math.hypot(one.stddev, other.stddev)
@@ -202,7 +241,7 @@ def _contradiction(
         return ""
     return (
         f"the scene has a camera pitch of {degrees_of(given.pitch_rad)}, and people and the room "
-        f"show {degrees_of(found.pitch_rad)}{of_height}: it is of another camera, lens or person, "
+        f"show {degrees_of(found.pitch_rad)}{more}: it is of another camera, lens or person, "
         "so every posture is at best uncertain; leave --scene out"
     )
 

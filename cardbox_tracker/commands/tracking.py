@@ -143,9 +143,11 @@ def _assumptions(request: TrackingRequest, scene: Scene, source: Recording) -> I
     yield from scene.words()
     yield from (f"{film.name} {film.camera}" for film in source.films)
     origin = "given" if person.model is None else f"from {person.model.name}"
-    distance = "found" if "distance_m" in person.body.unknown else origin
+    is_given = "distance_m" not in person.body.unknown
     for number, body in enumerate(scene.people, 1):
         whose = "" if person.people is None else f" of person {number}"
+        shown = "usual: nobody shows it" if "distance_m" in body.unknown else "found"
+        distance = origin if is_given else shown
         yield f"distance{whose} {body.placement.distance_m:.2f} m ({distance})"
     if person.stature_m is not None:
         each = " and ".join(f"{one:.2f}" for one in person.statures_m)

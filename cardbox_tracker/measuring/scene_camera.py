@@ -8,6 +8,7 @@ is usual, decide. In the same way people who lean aside show no roll.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -228,6 +229,31 @@ def scene_camera(
     return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
 
 
+def other_lens(
+    people: Sequence[Sightings],
+    statures_m: Sequence[float | None],
+    camera: Camera,
+    given: SceneCamera,
+    away: float,
+) -> float:
+    """Return how much better another lens explains the floor than people who stand elsewhere do.
+
+    They are seen farther ``away`` than in a given scene, as a logarithm, and with that lens would
+    be where it has them. The height of the camera above the floor, which follows from the place,
+    decides. Positive for another lens, in standard deviations; 0 without a floor. The other
+    arguments are those of :func:`scene_camera`.
+    """
+    tilt, off_m, stddev_m = ((given.pitch_rad.mean, 1e-3), (0.0, 1e-3)), list[float](), math.inf
+    for factor in (1.0, math.exp(-away)):
+        lens = replace(camera, fx=factor * camera.fx, fy=factor * camera.fy)
+        shown = people_camera(people, statures_m, lens, *tilt)
+        if shown is None or given.height_m is None:
+            return 0.0
+        off_m.append(abs(float(shown.values[2]) - given.height_m.mean))
+        stddev_m = min(stddev_m, math.sqrt(shown.covariance[2, 2]))
+    return (off_m[0] - off_m[1]) / stddev_m
+
+
 def in_scene(
     body: BodyModel,
     camera: SceneCamera,
@@ -260,34 +286,47 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
     if not people:
         # Without points, nothing tells the people from the background.
         return False
-    # The type of its third point argument lacks None.
-    flow: Any = cv2.calcOpticalFlowPyrLK
     shifted = pairs = 0
     sights = [sight for person in people for sight in person]
     for (time_s, before), (_, after) in pairwise(pictures):
-        greys = brightness_of(before), brightness_of(after)
-        height, width = greys[0].shape
-        free = np.full((height, width), 255, np.uint8)
+        free = np.full(before.shape[:2], 255, np.uint8)
         for seen_s, points in sights:
             if abs(seen_s - time_s) < 0.5:
                 _cover(free, points, camera)
-        corners: Any = cv2.goodFeaturesToTrack(greys[0], 200, 0.02, 0.01 * width, mask=free)
-        if corners is None:
-            continue
-        there, is_found, _ = flow(*greys, corners, None)
-        back, is_back, _ = flow(greys[1], greys[0], there, None)
-        same = np.linalg.norm(back - corners, axis=-1).ravel() < 1.0
-        same &= (is_found.ravel() > 0) & (is_back.ravel() > 0)
-        if same.sum() < _LEAST_POINTS:
-            continue
-        pairs += 1
-        shifts = (there - corners)[same].reshape(-1, 2)
-        shift = np.median(shifts, axis=0)
-        # Points of noise move, too, but not together.
-        spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
-        least = max(_SHIFT * max(width, height), 2 * spread)
-        shifted += bool(np.linalg.norm(shift) > least)
+        shift = background_shift(before, after, free)
+        if shift is not None:
+            pairs += 1
+            shifted += shift > _SHIFT
     return pairs > 0 and shifted > _SHIFTED_PAIRS * pairs
+
+
+def background_shift(
+    before: NDArray[np.uint8], after: NDArray[np.uint8], free: NDArray[np.uint8]
+) -> float | None:
+    """Return how far most of the background has moved in an image, as a share of the longer side.
+
+    ``free`` (H, W) is not 0 where no people are in the image ``before``. None if too few points are
+    found again.
+    """
+    # The type of its third point argument lacks None.
+    flow: Any = cv2.calcOpticalFlowPyrLK
+    greys = brightness_of(before), brightness_of(after)
+    height, width = greys[0].shape
+    corners: Any = cv2.goodFeaturesToTrack(greys[0], 200, 0.02, 0.01 * width, mask=free)
+    if corners is None:
+        return None
+    there, is_found, _ = flow(*greys, corners, None)
+    back, is_back, _ = flow(greys[1], greys[0], there, None)
+    same = np.linalg.norm(back - corners, axis=-1).ravel() < 1.0
+    same &= (is_found.ravel() > 0) & (is_back.ravel() > 0)
+    if same.sum() < _LEAST_POINTS:
+        return None
+    shifts = (there - corners)[same].reshape(-1, 2)
+    shift = np.median(shifts, axis=0)
+    # Points of noise move, too, but not together.
+    spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
+    length = float(np.linalg.norm(shift))
+    return length / max(width, height) if length > 2 * spread else 0.0
 
 
 def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None:

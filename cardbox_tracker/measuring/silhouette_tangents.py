@@ -19,8 +19,9 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.common.health import Verdict
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.common.least_squares import Residuals, geman_mcclure
+from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -35,6 +36,9 @@ _COUNTED = 150
 # noise; fewest heights and largest condition number.
 _ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
 _FEWEST, _LARGEST_CONDITION = 8, 1e6
+
+# Images as they come, mirrored, and upside down: what becomes of columns and rows about the middle.
+_FLIPS = np.array([np.diag((1.0, 1.0)), np.diag((-1.0, 1.0)), np.diag((-1.0, -1.0))])
 
 _Hull = tuple[FloatArray, NDArray[np.bool_]]
 
@@ -99,16 +103,9 @@ class TopTangents:
 
         It is in pixels of the other camera; NaN if a silhouette is cut off at the border.
         """
-        along, axes_here, axes = self.pencil(pose) if isinstance(pose, Extrinsics) else pose
-        found = np.full(len(self._hulls), np.nan)
-        for number, (one, two) in enumerate(self._hulls):
-            here, is_whole = _highest(one, axes_here)
-            there, is_whole_there = _highest(two, axes)
-            if is_whole and is_whole_there:
-                angles = [atan2(*(axes_here @ here)), atan2(*(axes @ there))]
-                across = sqrt(1.0 - float(there @ along) ** 2)
-                found[number] = (angles[0] - angles[1]) * across * self._other.fx
-        return found
+        pencil = self.pencil(pose) if isinstance(pose, Extrinsics) else pose
+        found = [_height_of(*pair, pencil) for pair in self._hulls]
+        return np.array(found, np.float64) * self._other.fx
 
     def residuals(self, heights: FloatArray, slopes: FloatArray) -> Residuals:
         """Return the residuals of :meth:`heights` (n,) with their derivatives (n, k)."""
@@ -117,6 +114,18 @@ class TopTangents:
         return geman_mcclure(
             heights[known][None], slopes[known][None], _HALF_PX, _HEIGHT_PX, weight
         )
+
+
+def _height_of(one: _Hull, two: _Hull, pencil: Pencil) -> float:
+    """Return the angle of the first camera's tangent above the other's, rad; nan if one is cut."""
+    (here, is_whole), (there, is_whole_there) = (
+        _highest(one, pencil.here),
+        _highest(two, pencil.there),
+    )
+    if not (is_whole and is_whole_there):
+        return float("nan")
+    angle = atan2(*(pencil.here @ here)) - atan2(*(pencil.there @ there))
+    return angle * sqrt(1.0 - float(there @ pencil.along) ** 2)
 
 
 def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float]:
@@ -156,19 +165,31 @@ def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
 
 def _hull(mask: Silhouette, camera: Camera) -> _Hull:
     """Return the convex hull as unit rays (n, 3), and whether each is inside the image, (n,)."""
+    px = _outline(mask)
+    return _hull_of(px, camera) if len(px) else (np.empty((0, 3)), np.empty(0, np.bool_))
+
+
+def _outline(mask: Silhouette) -> FloatArray:
+    """Return columns and rows of the convex hull (n, 2), px."""
     left, top, width, height = cv2.boundingRect(mask)
     if not width:
-        return np.empty((0, 3)), np.empty(0, np.bool_)
+        return np.empty((0, 2))
     seen = mask[top : top + height, left : left + width] != 0
     # The ends of the rows have the same hull as all pixels, and are a hundredth of them.
     starts, ends = seen.argmax(axis=1), width - 1 - seen[:, ::-1].argmax(axis=1)
     rows = np.flatnonzero(seen[np.arange(height), starts])
     columns = np.concatenate([starts[rows], ends[rows]]) + left
     points = np.column_stack([columns, np.concatenate([rows, rows]) + top]).astype(np.int32)
-    hull = cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
-    x, y = hull.T
+    return cv2.convexHull(points).reshape(-1, 2).astype(np.float64)
+
+
+def _hull_of(px: FloatArray, camera: Camera, flip: FloatArray = _FLIPS[0]) -> _Hull:
+    """Return :func:`_hull` of an outline (n, 2), px, in a flipped image: ``flip`` is (2, 2)."""
+    middle = 0.5 * np.array([camera.width - 1.0, camera.height - 1.0])
+    px = (px - middle) @ flip.T + middle
+    x, y = px.T
     inside = (x >= _BORDER_PX) & (x < camera.width - _BORDER_PX) & (y >= _BORDER_PX)
-    rays = camera.rays(hull)
+    rays = camera.rays(px)
     return rays / np.linalg.norm(rays, axis=1)[:, None], inside
 
 
@@ -181,61 +202,108 @@ def _highest(hull: _Hull, axes: FloatArray) -> tuple[FloatArray, bool]:
 
 
 EVERY = 6
-"""Frames between samples."""
-# The same for the first frames, whose number follows, so that a verdict comes early.
-_EVERY_AT_FIRST, _FIRST = 2, 60
-# An inverted pose's height is more than that of its inverse divided by this.
-_BETTER = 0.25
+"""Frames between samples of a model."""
+# The same for tangents, after the first ones.
+_EVERY, _FIRST = 2, 6
+# A supposed fault leaves less than this share of the height that the given pose leaves; the most
+# that counts of what it explains otherwise, degrees.
+_BETTER, _REST = 0.4, 0.1
+# Fewest joints that both cameras show.
+_LEAST_POINTS = 4
 
 
 class PoseDirection:
-    """Compares the heights of one further camera's tangents for its pose and the inverse pose.
+    """Compares the heights of one further camera's tangents for its pose and for usual faults.
 
     An error of the heights by degrees shows a wrong pose within seconds, also while no posture
-    fits. If they agree for the inverse pose, the pose is inverted or the images are exchanged.
+    fits. If they agree for the inverse pose, the pose is inverted or the images are exchanged; if
+    they do for flipped images, one of the cameras is mirrored or upside down. The joints that a
+    detector finds in both images have heights, too.
     """
 
     def __init__(self, first: Camera, other: Camera, given: Extrinsics, roll_rad: float) -> None:
         """Begin without samples; ``given`` is the pose of ``other``, turned upright by the roll."""
-        self._tangents = TopTangents(first, other, most=1)
+        self._cameras, tangents = (first, other), TopTangents(first, other)
         # The images have been turned by the roll of the given pose, even if that pose is inverted.
         c, s = np.cos(roll_rad), np.sin(roll_rad)
         roll = np.array([(c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)])
         raw = Extrinsics(roll @ given.rotation, roll @ given.translation_m).inverse()
         inverse = Extrinsics(roll.T @ raw.rotation, roll.T @ raw.translation_m)
-        self._pencils = [self._tangents.pencil(pose) for pose in (given, inverse)]
-        self._per_px = np.degrees(1.0 / other.fx)
+        self._given = pencil = tangents.pencil(given)
+        # Cameras flip their images before these are turned upright.
+        self._flips = _FLIPS, roll[:2, :2].T @ _FLIPS @ roll[:2, :2]
+        # Usual faults: pose, and which of ``_FLIPS`` each camera's images would be.
+        self._supposed = [
+            (Verdict("inverted", _explained), tangents.pencil(inverse), 0, 0),
+            (Verdict("mirrored", _explained), pencil, 0, 1),
+            (Verdict("mirrored", _explained), pencil, 1, 0),
+            (Verdict("upside down", _explained), pencil, 0, 2),
+            (Verdict("upside down", _explained), pencil, 2, 0),
+        ]
         self._frames = 0
-        self._inverted, self._wrong = Verdict("inverted", _explained), Verdict("contradicted")
+        self._wrong, self.joints = Verdict("contradicted"), Verdict("joints")
 
     @property
     def fault(self) -> Verdict | None:
         """The error according to the latest samples; None for a pose without a gross error."""
-        return next((one for one in (self._inverted, self._wrong) if one.holds), None)
+        explained = [one for one, *_ in self._supposed if one.holds]
+        best = min(explained, key=lambda one: one.medians[1], default=self._wrong)
+        return best if best.holds else None
 
     @property
     def height_deg(self) -> float:
         """Median angle between both cameras' tangent planes, degrees; 0 while unknown."""
         return self._wrong.value
 
-    def see(self, first: Silhouette, other: Silhouette) -> None:
-        """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not."""
+    def see(
+        self,
+        first: Silhouette,
+        other: Silhouette,
+        points: tuple[ImagePoints | None, ImagePoints | None] = (None, None),
+    ) -> None:
+        """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not.
+
+        ``points`` are those of a detector in both images.
+        """
+        self._see_joints(*points)
         self._frames += 1
-        # An error that is over is forgotten as soon as it was found.
-        is_often = self._frames <= _FIRST or self.fault is not None
-        if self._frames % (_EVERY_AT_FIRST if is_often else EVERY):
+        if self._frames > _FIRST and self._frames % _EVERY:
             return
-        if not self._tangents.add(first, other):
+        hulls = [
+            [_hull_of(px, camera, flip) for flip in flips]
+            for mask, camera, flips in zip((first, other), self._cameras, self._flips, strict=True)
+            if len(px := _outline(mask))
+        ]
+        if len(hulls) < len(self._cameras):
             return
-        heights = [float(self._tangents.heights(pencil)[0]) for pencil in self._pencils]
-        given, inverse = (abs(height) * self._per_px for height in heights)
-        if not np.isfinite(given):
+        given = abs(np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given)))
+        if np.isfinite(given):
+            self._wrong.see(given)
+        for verdict, pencil, here, there in self._supposed:
+            supposed = abs(np.degrees(_height_of(hulls[0][here], hulls[1][there], pencil)))
+            if np.isfinite(given) or np.isfinite(supposed):
+                # A supposed fault is none if it does not even show the top, as is the given pose.
+                verdict.see(*(float(np.nan_to_num(one, nan=np.inf)) for one in (given, supposed)))
+
+    def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> None:
+        if one is None or other is None:
             return
-        # The inverse pose is no better if it does not even show the top.
-        self._inverted.see(given, inverse if np.isfinite(inverse) else np.inf)
-        self._wrong.see(given)
+        known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
+        if np.count_nonzero(known) < _LEAST_POINTS:
+            return
+        angles = [
+            np.arctan2(*(axes @ camera.rays(points.px[known]).T))
+            for axes, camera, points in zip(
+                self._given[1:], self._cameras, (one, other), strict=True
+            )
+        ]
+        self.joints.see(float(np.degrees(np.median(np.abs(angles[0] - angles[1])))))
 
 
-def _explained(given: float, inverse: float) -> float:
-    """Return the height that the given pose leaves and the inverse one explains, or 0."""
-    return given if inverse < _BETTER * given else 0.0
+def _explained(given: float, supposed: float) -> float:
+    """Return the height that the given pose leaves if a supposed fault explains it, else a rest.
+
+    The rest is below the limit, and more than 0 if the fault still explains more than the pose.
+    """
+    given = min(given, WATCHES["contradicted"].limit)
+    return given if supposed < _BETTER * given else min(max(given - supposed, 0.0), _REST)

@@ -77,8 +77,9 @@ class _Compared:
         if self.turned.holds:
             shown = _shown(self.turned.value)
             yield WATCHES["extrinsics"].words.format(name=name, shown=shown)
-        elif not self.is_measured:
+        else:
             yield WATCHES["height"].remark(self.direction.height_deg, name=name)
+        yield self.direction.joints.remark(name=name)
         yield self.rolled.remark(name=name, shown=_shown(self.rolled.value))
 
     def place(self, state: FloatArray, column: float) -> None:
@@ -125,13 +126,19 @@ class CameraAgreement:
         if not _are_whole(frames):
             return False
         for one, other in zip(self._others, others, strict=True):
-            one.direction.see(first.silhouette, other.silhouette)
+            points = first.points, other.points
+            one.direction.see(first.silhouette, other.silhouette, points)
         return True
 
     @property
     def are_contradicted(self) -> list[bool]:
         """Whether the silhouettes show a gross error of the pose of each further camera."""
         return [one.direction.fault is not None for one in self._others]
+
+    @property
+    def are_doubtful(self) -> list[bool]:
+        """Whether anything is told of each further camera."""
+        return [any(one.remarks("")) for one in self._others]
 
     def see(
         self, state: FloatArray, frames: Sequence[Frame], columns: Sequence[float | None] = ()

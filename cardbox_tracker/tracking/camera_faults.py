@@ -3,9 +3,10 @@
 Sensors are noisy, so equal images come from a driver or a network that repeats the last one. They
 do no harm while the person stands still, and none if every second image is a repetition. A
 silhouette that fills the image shows a change of the light. In a mirrored image the person faces
-another way than in the first camera; only a detector's points in space tell that, and nothing does
-if the person faces that very camera. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds
-images that contradict the pose or the focal length.
+another way than in the first camera, as a detector's points in space tell, unless the person faces
+that very camera. The background of a camera that somebody has bumped into is elsewhere in its
+images. :mod:`cardbox_tracker.measuring.silhouette_tangents` finds images that contradict the pose
+or the focal length.
 """
 
 from __future__ import annotations
@@ -13,13 +14,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.health import WATCHES, Verdict
-from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame
+from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
+from cardbox_tracker.measuring.scene_camera import background_shift
+from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.observation import Observation
 
@@ -31,7 +33,10 @@ _POSE = (
 _LEAST = 2
 # Time for which a fault that is over is told, ns.
 _TOLD_NS = 1_000_000_000
-_SHOULDERS = [POINT_INDEX["left_shoulder"], POINT_INDEX["right_shoulder"]]
+# Time between comparisons of the background, ns; share of the width for the margin around people.
+_COMPARED_NS, _AROUND = 700_000_000, 20
+# Fewest points that tell.
+_FEWEST = 4
 
 
 class CameraFaults:
@@ -52,6 +57,10 @@ class CameraFaults:
         # The silhouettes of all cameras when each one's last image was new.
         self._then: list[list[NDArray[Any] | None]] = [[None] * count for _ in range(count)]
         self._turned = [Verdict("turned") for _ in range(count)]
+        # Each camera's first image with a silhouette, which the background is compared with.
+        self._begun: list[tuple[Image, Silhouette] | None] = [None] * count
+        self._moved = [Verdict("moved") for _ in range(count)]
+        self._compared_ns = [0] * count
 
     def without(
         self, observations: Sequence[Observation | None], stamp_ns: int | None = None
@@ -78,6 +87,9 @@ class CameraFaults:
             self._repeated[number].count(is_same)
             if shown is not None and not is_same:
                 self._last[number], self._then[number] = np.array(shown), kept
+            if one is not None and self._has_moved(number, one):
+                self._leave_out(number, WATCHES["moved"].words)
+                seen[number] = None
         frozen = [self._is_frozen(number, kept) for number in range(count)]
         for number in np.flatnonzero(frozen).tolist():
             self._leave_out(number, WATCHES["frozen"].words)
@@ -90,13 +102,15 @@ class CameraFaults:
         If all of several further cameras contradict the first one, that is left out.
         """
         is_whole = agreement.look(frames)
-        before_rad = facing_rad(frames[0].points, frames[0].camera) if is_whole else np.nan
+        before = frames[0].points if is_whole else None
         reasons = [_POSE if fault else "" for fault in agreement.are_contradicted]
         for number, (frame, view) in enumerate(zip(frames[1:], agreement.views, strict=True)):
-            turned_rad = facing_rad(frame.points, frame.camera) + view.yaw_rad - before_rad
-            if self.is_turned(number + 1, turned_rad):
+            if self.is_turned(number + 1, likeness(before, frame.points, view.yaw_rad)):
                 reasons[number] = reasons[number] or WATCHES["turned"].words
-        self.is_contradicted = len(reasons) == 1 and bool(reasons[0])
+        doubts = zip(reasons, agreement.are_doubtful, strict=True)
+        self.is_contradicted = any(
+            is_doubtful if not reason else len(reasons) == 1 for reason, is_doubtful in doubts
+        ) or (len(reasons) == 1 and any(one.holds for one in self._moved))
         wrong = ["", *reasons]
         if len(reasons) > 1 and all(reasons):
             wrong = [reasons[0], *[""] * len(reasons)]
@@ -124,14 +138,32 @@ class CameraFaults:
         )
         return moved > 0.0 if repeated.holds else WATCHES["frozen"].is_beyond(moved)
 
-    def is_turned(self, camera: int, turned_rad: float) -> bool:
+    def is_turned(self, camera: int, alike: float) -> bool:
         """Return whether somebody has faced another way than in the first camera for some images.
 
-        ``turned_rad`` is the difference in this image, or nan.
+        ``alike`` is the :func:`likeness` in this image, or nan.
         """
-        if np.isfinite(turned_rad):
-            self._turned[camera].see(abs(float(np.angle(np.exp(1j * turned_rad), deg=True))))
+        if np.isfinite(alike):
+            self._turned[camera].see(alike)
         return self._turned[camera].holds
+
+    def _has_moved(self, number: int, seen: Observation) -> bool:
+        """Return whether a camera stands elsewhere than in its first images, by the background."""
+        begun, moved = self._begun[number], self._moved[number]
+        if seen.image is None or seen.silhouette is None:
+            return moved.holds
+        if begun is None or seen.is_cut:
+            # Corners at the outline of people are theirs.
+            side = 1 + seen.image.shape[1] // _AROUND
+            people = (seen.silhouette != 0).astype(np.uint8)
+            near = cv2.dilate(people, np.ones((side, side), np.uint8))
+            self._begun[number] = np.array(seen.image), np.asarray(1 - near)
+        elif self._now_ns - self._compared_ns[number] >= _COMPARED_NS:
+            self._compared_ns[number] = self._now_ns
+            shift = background_shift(begun[0], seen.image, begun[1])
+            if shift is not None:
+                moved.see(100.0 * shift)
+        return moved.holds
 
     def remarks(self, names: Sequence[str] = (), is_all: bool = False) -> list[str]:
         """Return a warning for each camera that is left out now, with ``is_all`` also before."""
@@ -145,14 +177,22 @@ class CameraFaults:
         ]
 
 
-def facing_rad(points: ImagePoints | None, camera: Camera) -> float:
-    """Return the angle from left to right shoulder in the level frame, rad; nan without points."""
-    if points is None or points.spatial_m is None:
+def likeness(before: ImagePoints | None, now: ImagePoints | None, yaw_rad: float) -> float:
+    """Return the correlation of one person's points in space in two cameras; nan without them.
+
+    The level frame of the second camera is turned by ``yaw_rad`` about the vertical.
+    """
+    if before is None or now is None or before.spatial_m is None or now.spatial_m is None:
         return float("nan")
-    across, _, away = np.subtract(*points.spatial_m[_SHOULDERS[::-1]])
-    column = float(points.px[_SHOULDERS, 0].mean())
-    bearing = np.arctan((column - camera.cx) / camera.fx)
-    return float(np.arctan2(across, -away) - bearing)
+    places = np.concatenate([before.spatial_m, now.spatial_m], axis=1)
+    known = (np.minimum(before.scores, now.scores) >= CERTAIN) & np.isfinite(places).all(axis=1)
+    if np.count_nonzero(known) < _FEWEST:
+        return float("nan")
+    one, other = np.hsplit(places[known] - places[known].mean(axis=0), 2)
+    # The points are right, down and away; yaw turns from right towards the camera.
+    c, s = np.cos(yaw_rad), np.sin(yaw_rad)
+    turned = one @ np.array([(c, 0.0, -s), (0.0, 1.0, 0.0), (s, 0.0, c)])
+    return float(np.sum(turned * other) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-9))
 
 
 def _change(before: NDArray[Any] | None, now: NDArray[Any] | None) -> float:

@@ -279,6 +279,12 @@ class Tracker:
 
     def _doubted(self, estimate: Estimate, reason: str) -> Estimate:
         """Return an estimate that is no surer than body, distance, person and limits."""
+        place, wrong = estimate.place, self.body.camera_pose.contradiction
+        if self.faults.is_contradicted:
+            wrong = wrong or reason
+        if place is not None and wrong:
+            place = replace(place, contradiction=place.contradiction or wrong)
+            estimate = replace(estimate, place=place)
         if estimate.posture is None:
             return estimate
         reason = reason or self.body.camera_pose.contradiction

@@ -32,7 +32,7 @@ MARGIN_S = 0.2
 """Margin at both ends of a segment, because people move earlier or later than it says."""
 
 PROTOCOL = ("empty", "enter", "front", "side", "arms", "transition")
-"""Segments before the motions; they are not scored."""
+"""Segments before the motions; they are not scored unless postures are asked for."""
 _MOST_BYTES = 16 * 1024 * 1024
 
 REFERENCES = ("front", "side", "arms")
@@ -90,13 +90,17 @@ class RecordedSession:
         return all(name in self.spans for name in REFERENCES)
 
 
-def load_session(folder: str | os.PathLike[str], cameras: Sequence[str] = ()) -> RecordedSession:
+def load_session(
+    folder: str | os.PathLike[str], cameras: Sequence[str] = (), postures: bool = False
+) -> RecordedSession:
     """Read the ground truth of a session.
 
     Args:
         folder: the session.
         cameras: namespaces of those of its cameras that track; the true positions are in the frame
             of the first one. All cameras of the session, if this is empty.
+        postures: track from the front reference posture on, and score it and what follows, too: a
+            body that was measured there knows these images.
 
     Raises:
         CardboxError: the folder is not a session; the text names the missing part.
@@ -108,10 +112,11 @@ def load_session(folder: str | os.PathLike[str], cameras: Sequence[str] = ()) ->
     if cameras:
         truth = _with_cameras(path, truth, cameras)
     _check_segments(path, truth)
+    unscored = PROTOCOL[: PROTOCOL.index(REFERENCES[0])] if postures else PROTOCOL
     scored = {
         stamp: frame
         for stamp, frame in sorted(truth.frames.items())
-        if frame.is_in_sight and frame.segment not in PROTOCOL
+        if frame.is_in_sight and frame.segment not in unscored
     }
     unknown, extrinsics = np.full(3, np.nan), path / "extrinsics.yaml"
     hips = [unknown if frame.hips_m is None else frame.hips_m for frame in scored.values()]
@@ -121,7 +126,7 @@ def load_session(folder: str | os.PathLike[str], cameras: Sequence[str] = ()) ->
         extrinsics if extrinsics.is_file() else None,
         truth,
         {name: _inside(*truth.spans[name]) for name in REFERENCE_SPANS if name in truth.spans},
-        truth.spans[_first_motion(truth)][0],
+        truth.spans[REFERENCES[0] if postures else _first_motion(truth)][0],
         np.array(list(scored), np.int64),
         np.array([frame.segment for frame in scored.values()]),
         np.array([frame.keypoints_m for frame in scored.values()]).reshape(-1, 6, 3),

@@ -22,7 +22,10 @@ from cardbox_tracker.camera.extrinsics_files import (
     save_camchain,
     transforms_of,
 )
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CameraError
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.tracking.session import Session
 
 
 @pytest.fixture
@@ -175,6 +178,16 @@ def test_sources_have_an_order_and_have_to_agree() -> None:
         choose([one, None, far], "left", "right")
     with pytest.raises(CameraError, match="--extrinsics FILE"):
         choose([None, None, None], "left", "right")
+
+
+def test_a_pose_that_is_no_more_than_a_placeholder_is_refused() -> None:
+    """No two cameras stand at the same place, whatever their direction."""
+    at_first = Extrinsics(np.diag((-1.0, 1.0, -1.0)), np.zeros(3), "rig.yaml")
+    with pytest.raises(CameraError, match=r"rig\.yaml.*same place.*placeholder.*--extrinsics"):
+        choose([at_first], "left", "right")
+    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+    with pytest.raises(CameraError, match="same place"):
+        Session([BodyModel()], camera, others=[OtherCamera(camera, at_first)])
 
 
 @pytest.mark.promise("Any damaged or hostile input is read or refused with a reason")

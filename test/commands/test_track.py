@@ -5,7 +5,9 @@ from __future__ import annotations
 import csv
 import json
 import math
+import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from cardbox_tracker.commands import scene as scene_module
 from cardbox_tracker.detectors import detector as detector_module
 from cardbox_tracker.detectors.model_files import ModelFiles
 from cardbox_tracker.measuring.people_camera import Distances
-from cardbox_tracker.measuring.scene import SceneCamera, Value
+from cardbox_tracker.measuring.scene import SceneCamera, Value, load_scene, save_scene
 from cardbox_tracker.measuring.scene_camera import FoundCamera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import load_body_model
@@ -208,6 +210,17 @@ def test_a_film_is_tracked_with_a_stature(
     assert cardbox("track", film, "--fov", fov, *words).code == 0
 
 
+def test_the_distance_of_nobody_is_not_found(
+    film: Path, fov: str, cardbox: Callable[..., Any]
+) -> None:
+    words = ("--stature", 1.75, "--background", "0:2", "--start", 2, "--end", 3.5)
+    done = cardbox("track", film, "--fov", fov, *words)
+    assert done.code == 0, done.err
+    assert "tracked 0 of" in done.out
+    assert "m (usual: nobody shows it)" in done.out
+    assert "m (found)" not in done.out
+
+
 def test_the_overlay_has_the_aspect_and_the_resolution_of_a_film_held_upright(
     files: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cardbox: Callable[..., Any]
 ) -> None:
@@ -355,11 +368,39 @@ def test_a_film_with_its_own_scene_has_the_same_bytes(
     assert (tmp_path / "a.scene.yaml").read_text() == (tmp_path / "b.scene.yaml").read_text()
 
 
+@pytest.mark.usefixtures("quick_sight")
+def test_a_film_with_the_scene_of_another_lens_has_no_sure_place(
+    film: Path, cardbox: Callable[..., Any], tmp_path: Path
+) -> None:
+    common = ("track", film, "--background=0:3.9", "--start=16", "--end=17.5")
+    done = cardbox(*common, "--fov=60", "--stature=1.72", f"--csv={tmp_path / 'a.csv'}")
+    assert done.code == 0, done.err
+    scene = load_scene(tmp_path / "a.scene.yaml")
+    lens = scene.camera.fov_rad._replace(mean=math.radians(95.0))
+    save_scene(replace(scene, camera=scene.camera._replace(fov_rad=lens)), tmp_path / "b.yaml")
+    b = tmp_path / "b.csv"
+    done = cardbox(*common, f"--scene={tmp_path / 'b.yaml'}", f"--csv={b}")
+    assert done.code == 0, done.err
+    assert re.search(r"somebody is 0\.[4-7]\d times as far away as in the scene", done.err)
+    with b.open(encoding="utf-8") as file:
+        assert {row["place_state"] for row in csv.DictReader(file)} == {"uncertain"}
+
+
 @pytest.mark.parametrize(
-    ("pitch_deg", "height_m", "is_told"), [(3.0, 1.5, False), (17.0, 1.5, True), (3.0, 2.2, True)]
+    ("pitch_deg", "height_m", "fov_rad", "is_told"),
+    [
+        (3.0, 1.5, 1.0, False),
+        (17.0, 1.5, 1.0, True),
+        (3.0, 2.2, 1.0, True),
+        (3.0, 1.5, 1.1, True),
+    ],
 )
 def test_people_who_contradict_a_scene_are_told(
-    monkeypatch: pytest.MonkeyPatch, pitch_deg: float, height_m: float, is_told: bool
+    monkeypatch: pytest.MonkeyPatch,
+    pitch_deg: float,
+    height_m: float,
+    fov_rad: float,
+    is_told: bool,
 ) -> None:
     def camera(deg: float, metres: float) -> SceneCamera:
         pitch = Value(math.radians(deg), math.radians(2.0))
@@ -368,10 +409,11 @@ def test_people_who_contradict_a_scene_are_told(
     found = FoundCamera(camera(pitch_deg, height_m))
     monkeypatch.setattr(scene_module, "scene_camera", lambda *_: found)
     watched = Watched((), (), [[]])
-    given = camera(2.0, 1.6)
+    given = camera(2.0, 1.6)._replace(fov_rad=Value(fov_rad, 0.01))
     told = scene_module._contradiction(
         watched, [BodyModel()], given, Camera(64, 48, 60.0, 60.0, 31.5, 23.5)
     )
     assert bool(told) is is_told
     if is_told:
         assert "2 degrees down" in told and f"{height_m:.2f} m" in told and "leave --scene" in told
+        assert "a field of view of 56 degrees, not" in told

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import Any
+
+import cv2
 import numpy as np
 import pytest
 
@@ -11,6 +15,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring import camera_guess, camera_pose
 from cardbox_tracker.measuring.camera_guess import guessed_extrinsics, reference_states
 from cardbox_tracker.measuring.camera_pose import (
@@ -323,6 +328,61 @@ def test_the_direction_of_a_pose_is_judged(
         assert found.height_deg == pytest.approx(5.0, abs=0.7)
 
 
+@pytest.mark.parametrize("camera", [0, 1])
+@pytest.mark.parametrize(
+    ("flip", "fault"), [(np.s_[:, ::-1], "mirrored"), (np.s_[::-1, ::-1], "upside down")]
+)
+def test_flipped_images_of_either_camera_are_told(camera: int, flip: Any, fault: str) -> None:
+    found = PoseDirection(CAMERA, OTHER, TRUE, 0.0)
+    for frame in sightings(waving(12)):
+        pair = [frame.first, frame.other]
+        pair[camera] = np.ascontiguousarray(pair[camera][flip])
+        found.see(*pair)
+    assert told(found) == fault
+
+
+def test_a_mirrored_camera_is_told_if_it_is_also_turned_about_its_axis() -> None:
+    """Its images are mirrored first, and then turned upright by the roll of its pose."""
+    rolled = moved_by(TRUE, np.radians([0.0, 0.0, 5.0, 0.0, 0.0, 0.0]))
+    view = View.of(BODY, CAMERA, OtherCamera(OTHER, rolled))
+    asked, right = (CameraAgreement(BODY, CAMERA, [view]) for _ in range(2))
+    for frame in sightings(waving(12), pose=rolled):
+        sharp = {"dsize": (320, 240), "flags": cv2.INTER_NEAREST}
+        raw = np.asarray(cv2.warpAffine(frame.other, view.raw_px, **sharp), np.uint8)
+        for one, seen in ((right, raw), (asked, np.ascontiguousarray(raw[:, ::-1]))):
+            one.look(framed(frame.first, view.upright(seen, is_mask=True)))
+    assert [one.direction.fault for one in right._others] == [None]
+    (fault,) = (one.direction.fault for one in asked._others)
+    assert fault is not None and fault.watch.name == "mirrored"
+    assert fault.medians[1] < 0.1
+
+
+@pytest.mark.parametrize(
+    ("turned_deg", "zoom", "height_deg"), [(0.0, 1.0, 0.0), (2.0, 1.0, 2.3), (0.0, 1.3, 2.3)]
+)
+def test_joints_in_both_images_tell_a_wrong_pose_or_focal_length(
+    turned_deg: float, zoom: float, height_deg: float
+) -> None:
+    """Joints of somebody two metres away, from 0.6 m below the camera to 0.3 m above it.
+
+    The planes through the baseline, at 60 degrees to the line of sight, turn by 2 / sin(60).
+    """
+    places = np.random.default_rng(0).uniform((-0.4, -0.3, 1.8), (0.4, 0.6, 2.2), (17, 3))
+    there = places @ TRUE.rotation.T + TRUE.translation_m
+    pair = [
+        ImagePoints(camera.project(seen), np.ones(17))
+        for camera, seen in ((CAMERA, places), (OTHER, there))
+    ]
+    wrong = moved_by(TRUE, np.radians([turned_deg, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    other = replace(OTHER, fx=zoom * OTHER.fx, fy=zoom * OTHER.fy)
+    found, nobody = PoseDirection(CAMERA, other, wrong, 0.0), np.zeros((240, 320), np.uint8)
+    for _ in range(6):
+        assert not found.joints.holds
+        found.see(nobody, nobody, (pair[0], pair[1]))
+    assert found.joints.value == pytest.approx(height_deg, abs=0.2)
+    assert found.joints.holds == (height_deg > 0.0)
+
+
 def test_a_few_frames_and_empty_images_say_nothing() -> None:
     found = PoseDirection(CAMERA, OTHER, TRUE.inverse(), 0.0)
     (frame,) = sightings(waving(1))
@@ -383,6 +443,18 @@ def followed(
     tracker = Tracker(BODY, cameras[0], default_preset(), rng, others=others)
     pairs = [[Observation(frame.first), Observation(frame.other)] for frame in frames]
     return [tracker.track(pair) for pair in pairs][12:]
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 2.0])
+def test_nobody_is_sure_of_whom_one_camera_shows_higher(turned_deg: float) -> None:
+    wrong = moved_by(TRUE, np.radians([turned_deg, 0.0, 0.0, 0.0, 0.0, 0.0]))
+    found = followed(sightings(waving(24, 1.0 / 15.0)), (CAMERA, OTHER), wrong)
+    is_right = turned_deg == 0.0
+    assert any(one.state == TRACKING for one in found) == is_right
+    for one in found:
+        assert one.place is not None
+        assert (one.place.state == KeypointState.TRACKED) == is_right
+        assert is_right or one.reason == "the cameras contradict each other"
 
 
 @pytest.mark.parametrize("seed", range(4))

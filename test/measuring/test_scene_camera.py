@@ -17,7 +17,8 @@ from cardbox_tracker.detectors.image_points import (
     LegPoints,
 )
 from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS, people_camera
-from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, scene_camera
+from cardbox_tracker.measuring.scene import SceneCamera, Value
+from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, other_lens, scene_camera
 from cardbox_tracker.person.proportions import MARKED_HEIGHTS
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
@@ -252,3 +253,25 @@ def test_a_lens_that_is_known_stays_and_a_distance_that_contradicts_it_is_told()
         remarks = [remark for remark in shown.remarks if "field of view" in remark]
         assert len(remarks) == bool(told)
         assert all(words in remarks[0] for words in told)
+
+
+@pytest.mark.parametrize("pitch_deg", [0.0, 20.0])
+def test_the_floor_tells_another_lens_from_people_who_stand_elsewhere(pitch_deg: float) -> None:
+    """The scene has somebody 3 m away; who stands elsewhere keeps the camera's height."""
+    value = Value(np.radians(pitch_deg), np.radians(4.0))
+    scene = SceneCamera(lens_of(CAMERA), value, Value(0.0, 0.01), Value(HEIGHT_M, 0.2))
+    half = replace(CAMERA, fx=250.0, fy=250.0)
+    decided = []
+    for places, camera, away in (
+        ([(2.0, 0.0)] * 6, CAMERA, np.log(2 / 3)),
+        (STAND, half, np.log(1 / 2)),
+    ):
+        people = [film(places, pitch_deg)]
+        decided.append(other_lens(people, [STATURE_M], camera, scene, away))
+    elsewhere, other = decided
+    if pitch_deg:
+        assert elsewhere < -2.0 and other > 2.0
+    else:
+        # A camera that looks ahead sees the same with any lens from another distance.
+        assert abs(elsewhere) < 2.0 and abs(other) < 2.0
+    assert other_lens([], [], CAMERA, scene, 0.5) == 0.0

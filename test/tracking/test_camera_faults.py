@@ -6,8 +6,13 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
-from cardbox_tracker.tracking.camera_faults import CameraFaults, facing_rad
+from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.camera_agreement import CameraAgreement
+from cardbox_tracker.tracking.camera_faults import CameraFaults, likeness
 from cardbox_tracker.tracking.observation import Observation
 
 
@@ -83,15 +88,50 @@ def test_a_silhouette_that_fills_the_image_needs_points_and_is_forgotten_after_a
     assert len(cameras.remarks(is_all=True)) == 1
 
 
-def test_the_direction_of_the_shoulders_by_hand() -> None:
-    camera = Camera(80, 60, 40.0, 40.0, 40.0, 30.0)
-    px, spatial_m = np.full((17, 2), 40.0), np.zeros((17, 3))
-    left, right = (POINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right"))
-    # The left shoulder is on the right in the image, and 45 degrees farther away.
-    spatial_m[left], spatial_m[right] = (0.2, 0.0, 0.2), (-0.2, 0.0, -0.2)
-    ahead = ImagePoints(px, np.ones(17), spatial_m=spatial_m)
-    assert facing_rad(ahead, camera) == pytest.approx(np.radians(-45.0))
-    # The line of sight is 45 degrees to the right.
-    aside = ImagePoints(px + np.array([40.0, 0.0]), np.ones(17), spatial_m=spatial_m)
-    assert facing_rad(aside, camera) == pytest.approx(np.radians(-90.0))
-    assert np.isnan(facing_rad(None, camera))
+@pytest.mark.parametrize("camera", [0, 1])
+def test_a_camera_that_is_bumped_is_told_within_two_seconds_and_nobody_is_sure(camera: int) -> None:
+    """Two degrees are 11 of 320 pixels; the person walks before the wall meanwhile."""
+    tiles = np.random.default_rng(0).integers(0, 255, (2, 48, 64), np.uint8)
+    walls = [np.kron(one, np.ones((5, 5), np.uint8)) for one in tiles]
+    cameras = CameraFaults(2)
+    for number in range(60):
+        mask = np.zeros((240, 320), np.uint8)
+        mask[40:, 40 + 2 * number : 80 + 2 * number] = 255
+        pair = [Observation(mask, np.where(mask, np.uint8(number), wall)) for wall in walls]
+        if number >= 30:
+            seen = pair[camera].image
+            assert seen is not None
+            pair[camera] = Observation(mask, np.roll(seen, 11, axis=1))
+        kept = cameras.without(pair, number * 66_666_667)
+        if number < 30:
+            assert None not in kept and cameras.remarks() == []
+    assert kept[camera] is None and kept[1 - camera] is not None
+    assert "has moved" in cameras.remarks()[0]
+    lens, beside = Camera(320, 240, 300.0, 300.0, 159.5, 119.5), np.array([-0.5, 0.0, 0.0])
+    other = OtherCamera(lens, Extrinsics(np.eye(3), beside))
+    agreement = CameraAgreement(BodyModel(), lens, [View.of(BodyModel(), lens, other)])
+    cameras.agreeing([Frame(lens, {"silhouette": mask}, 240, 1)] * 2, agreement)
+    assert cameras.is_contradicted
+
+
+def test_a_mirrored_person_in_space_is_unlike() -> None:
+    """The first camera sees the person from the front, the other one from their left."""
+    px = np.full((17, 2), 40.0)
+    names = "left_shoulder", "right_shoulder", "left_elbow", "right_elbow", "nose"
+    at = [POINT_NAMES.index(name) for name in names]
+    # Right, down and away: the left arm points at the first camera.
+    front = [(0.2, 0, 0), (-0.2, 0, 0), (0.2, 0, -0.3), (-0.2, 0.3, 0), (0, -0.2, -0.1)]
+    spatial_m = np.zeros((2, 17, 3))
+    spatial_m[0, at] = front
+    spatial_m[1, at] = [(away, down, -right) for right, down, away in front]
+    scores = np.isin(np.arange(17), at).astype(float)
+    ahead, aside = (ImagePoints(px, scores, spatial_m=one) for one in spatial_m)
+    assert likeness(ahead, ahead, 0.0) == pytest.approx(1.0)
+    assert likeness(ahead, aside, np.radians(90.0)) == pytest.approx(1.0)
+    assert likeness(ahead, aside, np.radians(30.0)) < 0.8
+    swapped = np.arange(17)
+    swapped[at] = np.array(at)[[1, 0, 3, 2, 4]]
+    mirrored = ImagePoints(px, scores, spatial_m=spatial_m[1, swapped] * (-1.0, 1.0, 1.0))
+    assert likeness(ahead, mirrored, np.radians(90.0)) < 0.5
+    assert np.isnan(likeness(None, aside, 0.0))
+    assert np.isnan(likeness(ahead, ImagePoints(px, scores), 0.0))

@@ -46,6 +46,9 @@ def test_a_session_is_scored_after_the_reference_postures(session: Path) -> None
     assert loaded.mediapipe == {"aligned": 9.9, "pa": 5.0}
     assert loaded.mediapipe_ms == 12.5
     assert loaded.spans["front"].start_s > loaded.truth.spans["front"][0]
+    whole = load_session(session, postures=True)
+    assert {"front", "side", "arms", "transition", "neutral", "wave"} == set(whole.segments)
+    assert whole.start_s == loaded.truth.spans["front"][0]
 
 
 def test_the_command_writes_report_and_numbers(

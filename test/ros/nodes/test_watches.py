@@ -93,10 +93,24 @@ def full(measures: Sequence[float]) -> Told:
         yield faults.without([Observation(person()), Observation(mask)])[1] is None
 
 
+def moved(measures: Sequence[float]) -> Told:
+    """The background of the other camera lies aside by whole pixels, also where people went."""
+    room = np.kron(np.random.default_rng(0).integers(0, 255, (48, 64), np.uint8), np.ones((5, 5)))
+    faults, number = CameraFaults(2), 0
+    for percent in (0.0, *measures):
+        shown = np.roll(room.astype(np.uint8), round(3.2 * percent), axis=1)
+        for _ in range(40):
+            number += 1
+            pair = Observation(person(), room.astype(np.uint8)), Observation(person(), shown)
+            told = faults.without(pair, number * PERIOD_NS)[1] is None
+        if percent:
+            yield told
+
+
 def turned(measures: Sequence[float]) -> Told:
     faults = CameraFaults(2)
-    for degrees in measures:
-        yield [faults.is_turned(1, -np.radians(degrees) + 2 * np.pi) for _ in range(15)][-1]
+    for alike in measures:
+        yield [faults.is_turned(1, alike) for _ in range(15)][-1]
 
 
 def contradicted(measures: Sequence[float]) -> Told:
@@ -110,11 +124,26 @@ def contradicted(measures: Sequence[float]) -> Told:
         yield direction.fault is not None
 
 
-def inverted(measures: Sequence[float]) -> Told:
-    verdict, unexplained = (Verdict("inverted", _explained) for _ in range(2))
+def supposed(name: str) -> Callable[[Sequence[float]], Told]:
+    def told(measures: Sequence[float]) -> Told:
+        verdict, unexplained = (Verdict(name, _explained) for _ in range(2))
+        for degrees in measures:
+            assert not [unexplained.see(degrees, 0.45 * degrees) for _ in range(15)][-1]
+            yield [verdict.see(degrees, 0.35 * degrees) for _ in range(15)][-1]
+
+    return told
+
+
+def joints(measures: Sequence[float]) -> Told:
+    """A detector finds the joints on one row, and lower by an angle in the other image."""
+    direction, nobody = PoseDirection(CAMERA, CAMERA, BESIDE, 0.0), np.zeros((240, 320), np.uint8)
     for degrees in measures:
-        assert not [unexplained.see(degrees, 0.3 * degrees) for _ in range(15)][-1]
-        yield [verdict.see(degrees, 0.2 * degrees) for _ in range(15)][-1]
+        px = np.column_stack([np.linspace(150, 170, 17), np.full(17, CAMERA.cy)])
+        lower = px + np.array([0.0, 300.0 * np.tan(np.radians(degrees))])
+        pair = ImagePoints(px, np.ones(17)), ImagePoints(lower, np.ones(17))
+        for _ in range(15):
+            direction.see(nobody, nobody, pair)
+        yield direction.joints.holds
 
 
 def compared(source: str) -> CameraAgreement:
@@ -480,12 +509,16 @@ CASES = [
     Case("frozen", 0.07, 0.1, frozen),
     Case("frozen for long", 14, 15, frozen_for_long),
     Case("full", 0.75, 0.85, full),
-    Case("turned", 45, 55, turned),
-    Case("inverted", 0.25, 0.35, inverted),
+    Case("moved", 0.93, 1.25, moved),
+    Case("turned", 0.72, 0.68, turned, lasting=0.73, ending=0.77),
+    Case("inverted", 0.25, 0.35, supposed("inverted")),
+    Case("mirrored", 0.15, 0.25, supposed("mirrored"), lasting=0.06, ending=0.04),
+    Case("upside down", 0.25, 0.35, supposed("upside down"), lasting=0.06, ending=0.04),
     Case("contradicted", 2.2, 2.8, contradicted),
     Case("extrinsics", 0.8, 0.9, of_extrinsics("turned")),
     Case("extrinsics unmeasured", 5.5, 6.5, of_extrinsics("turned", PROPORTIONS)),
     Case("height", 0.8, 1.3, height),
+    Case("joints", 1.6, 1.7, joints),
     Case("unit", 0.25, 0.35, of_extrinsics("unit")),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
