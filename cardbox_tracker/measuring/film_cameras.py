@@ -79,11 +79,13 @@ _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
 _COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
 # Residual from which on it counts less, deviations.
 _ROBUST = 2.0
+_FACE, _EARS = slice(0, 3), slice(3, 5)
 # How much further than its partner of the other side a joint is if the body hides it, m.
 _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
 _ROUNDS, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 0.05
+_INNER = 4
 _OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
 # Deviation of what is given.
 _GIVEN = 1e-4
@@ -107,7 +109,13 @@ class Seen:
         self.times_s = np.array([time_s for time_s, _ in sightings])
         known = (scores >= _LEAST_SCORE) & is_inside(px, camera)
         self.rays = np.where(known[..., None], camera.rays(px)[..., :2], 0.0)
+        is_exchanged = _are_exchanged(self.rays, known)
+        for values in (self.rays, known, self.spatial_m):
+            values[is_exchanged] = values[is_exchanged][:, _OTHER_SIDE]
         behind_m = self.spatial_m[..., 2] - self.spatial_m[:, _OTHER_SIDE, 2]
+        # The head hides the face of who looks away.
+        away_m = self.spatial_m[:, _FACE, 2] - self.spatial_m[:, _EARS, 2].mean(axis=1)[:, None]
+        behind_m[:, _FACE] = np.fmax(behind_m[:, _FACE], away_m)
         hidden = np.clip(np.nan_to_num(behind_m) / _FAR_SIDE_M, 0.0, 1.0)
         self.sure = known / (1.0 + (_HIDDEN - 1.0) * hidden)
         self.period_s = float(np.median(np.diff(self.times_s)))
@@ -137,6 +145,19 @@ class Seen:
         deviation = np.sqrt((speeds**2).sum(axis=0) / count)
         speeds = np.clip(speeds / np.maximum(deviation, 1e-9), -_MOST_SPEED, _MOST_SPEED)
         return speeds, known.astype(np.float64)
+
+
+def _are_exchanged(rays: FloatArray, known: BoolArray) -> BoolArray:
+    """Return in which of n images a detector takes left for right, unlike in most of them, (n,)."""
+    is_exchanged, last, ever = np.zeros(len(rays), np.bool_), rays[0].copy(), known[0].copy()
+    for number, (now, seen) in enumerate(zip(rays, known, strict=True)):
+        both = seen & seen[_OTHER_SIDE] & ever
+        moved = [np.linalg.norm(one - last, axis=1)[both].sum() for one in (now, now[_OTHER_SIDE])]
+        is_exchanged[number] = moved[1] < moved[0]
+        if is_exchanged[number]:
+            now, seen = now[_OTHER_SIDE], seen[_OTHER_SIDE]
+        last, ever = np.where(seen[:, None], now, last), ever | seen
+    return is_exchanged ^ bool(is_exchanged.mean() > 0.5)
 
 
 def _all_points(points: ImagePoints) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -340,26 +361,30 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
         for a, one in enumerate(first.people)
         for b, other in enumerate(film.people)
     }
+    is_given = film.offset_s is not None
     tried = [] if film.offset_s is None else [film.offset_s]
-    for lags, sure in curves.values() if film.offset_s is None else ():
+    for lags, sure in () if is_given else curves.values():
         peaks = 1 + np.flatnonzero((sure[1:-1] > sure[:-2]) & (sure[1:-1] >= sure[2:]))
-        tried += lags[peaks[sure[peaks] > _SURE]].tolist()
+        tried += lags[peaks[sure[peaks] > 0.0]].tolist()
     found = list[tuple[float, float, Who]]()
     for offset_s in tried:
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
             gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
-        pairs = list(zip(*linear_sum_assignment(-gains), strict=True))
-        same = {int(a): int(b) for a, b in pairs if gains[a, b] > 0.0}
-        if same:
+        pairs = sorted(zip(*linear_sum_assignment(-gains), strict=True), key=lambda at: -gains[at])
+        # Chance gives each of them its own.
+        alike = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
+        most = int(np.argmax(alike))
+        if is_given or alike[most] > _SURE:
+            same = {int(a): int(b) for a, b in pairs[: most + 1]}
             who = tuple(same.get(a) for a in range(len(first.people)))
-            found.append((sum(gains[pair] for pair in pairs), offset_s, who))
+            found.append((float(alike[most]), offset_s, who))
     taken = list[float]()
-    is_given = film.offset_s is not None
     for alike, offset_s, who in sorted(found, key=lambda one: -one[0]):
         if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
             taken.append(offset_s)
-            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(alike > _CLEAR)
+            within_s = 0.0 if is_given else max(step_s, _APART_S / 2.0)
+            yield offset_s, within_s, who, is_given or bool(alike > _CLEAR)
 
 
 def _starts(
@@ -470,21 +495,26 @@ _ENDS, _LENGTHS = _BONES[:, :2], _BONES[:, 2]
 
 
 class _Points(NamedTuple):
-    """Triangulated points in m images.
+    """Points of a person in m images before c films.
 
     Attributes:
-        places_m: in the optical frame of the first of c films, (m, 25, 3).
-        there_m: in that of each film, (c, m, 25, 3).
+        places_m: in the optical frame of the first film, (m, 25, 3).
         rays: that were seen, (c, m, 25, 2).
         sure: how sure, (c, m, 25); 0 for a point that fewer than two films show.
-        matrix: of the normal equations of each point, (m, 25, 3, 3).
+        turns, moves_m: poses of the films, (c, 3, 3) and (c, 3).
     """
 
     places_m: FloatArray
-    there_m: FloatArray
     rays: FloatArray
     sure: FloatArray
-    matrix: FloatArray
+    turns: FloatArray
+    moves_m: FloatArray
+
+    @property
+    def there_m(self) -> FloatArray:
+        """The places in the optical frame of each film, (c, m, 25, 3)."""
+        turned = np.einsum("cij,mpj->cmpi", self.turns, self.places_m)
+        return turned + self.moves_m[:, None, None]
 
 
 class _Fit:
@@ -500,7 +530,7 @@ class _Fit:
         """Take which unknowns of the c films are given, (c, 7), and limits of offsets, (2, c)."""
         self._moments, self._fixed, self._offsets_s = moments, fixed, offsets_s
         self._point = _POINT
-        self._scales: list[tuple[FloatArray, FloatArray]] = []
+        self._scales: list[FloatArray] = []
 
     def half(self, number: int) -> _Fit:
         """Return the fit of the first or second half of the images."""
@@ -552,65 +582,126 @@ class _Fit:
         across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
         across *= (sure**2)[..., None, None]
         centres = -np.einsum("cji,cj->ci", turns, films[:, _MOVE])
-        matrix = across.sum(axis=0)
         right = np.einsum("cmpij,cj->mpi", across, centres)
-        loose = matrix + 1e-9 * np.eye(3)
+        loose = across.sum(axis=0) + 1e-9 * np.eye(3)
         places_m = np.linalg.solve(loose, right[..., None])[..., 0]
-        there_m = np.einsum("cij,mpj->cmpi", turns, places_m) + films[:, None, None, _MOVE]
-        return _Points(places_m, there_m, rays, sure, matrix)
+        return _Points(places_m, rays, sure, turns, films[:, _MOVE])
 
-    def _scale(self, unknowns: FloatArray, one: _Moments) -> tuple[FloatArray, FloatArray]:
-        """Return distances to each film, (c, m, 1, 1), m, and deviations of bones, (m, b), m.
+    def _scale(self, unknowns: FloatArray, one: _Moments) -> FloatArray:
+        """Return distances to each film, (c, m, 1, 1), m.
 
         They stay while the unknowns change: otherwise a smaller scene would fit better.
         """
         points = self._triangulated(unknowns, one)
-        is_seen = (points.sure > 0.0) & (points.there_m[..., 2] > _NEAREST_M)
-        count, depth_m = is_seen.sum(axis=2), points.there_m[..., 2]
+        depth_m = points.there_m[..., 2]
+        is_seen = (points.sure > 0.0) & (depth_m > _NEAREST_M)
+        count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
-        far_m = np.where(count > 0, far_m, 1.0)
-        # Rays that hardly meet leave the depth of a point open.
-        meets = np.sqrt(np.clip(np.linalg.eigvalsh(points.matrix)[..., 0], 1e-3, 1.0))
-        worst = meets[:, _ENDS].min(axis=-1)
-        return far_m[..., None, None], np.hypot(_BONE, self._point / worst) * one.stature_m
+        return np.where(count > 0, far_m, 1.0)[..., None, None]
 
-    def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-        """Return residuals in deviations, weights of losses, and which length each has, or -1."""
-        rows, weights, first = list[FloatArray](), list[FloatArray](), self._fixed.size
-        lengths = list[NDArray[np.int64]]()
-        for one, (far_m, deviation_m) in zip(self._moments, self._scales, strict=True):
-            points = self._triangulated(unknowns, one)
-            seen = points.there_m[..., :2] / np.maximum(points.there_m[..., 2:], _NEAREST_M)
-            away = (seen - points.rays) * far_m / (self._point * one.stature_m)
-            away *= points.sure[..., None]
-            ends_m = points.places_m[:, _ENDS]
-            length_m = np.linalg.norm(ends_m[:, :, 0] - ends_m[:, :, 1], axis=-1)
-            off_m = length_m - np.exp(unknowns[first + _LENGTHS])
-            is_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
-            rows += [away.ravel(), (off_m / deviation_m * is_seen).ravel()]
-            weights.append(np.full(away.size + off_m.size, one.weight))
-            lengths += [np.full(away.size, -1), np.tile(first + _LENGTHS, len(off_m))]
+    def _of_person(self, unknowns, one, far_m, first):
+        """Return residuals, Jacobian (R, n)."""
+        points = self._triangulated(unknowns, one)
+        places = points.places_m
+        m = len(places)
+        scale = far_m / (self._point * one.stature_m) * points.sure[..., None]   # c m p 1
+        bone_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
+        lengths = np.exp(unknowns[first + _LENGTHS])
+        bone_scale = bone_seen / (_BONE * one.stature_m)
+        def residuals(places, rays, turns, moves):
+            there = np.einsum("cij,mpj->cmpi", turns, places) + moves[:, None, None]
+            z = np.maximum(there[..., 2:], _NEAREST_M)
+            seen = there[..., :2] / z
+            return (seen - rays) * scale, there, z, seen
+        def bones(places):
+            d = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
+            n = np.maximum(np.linalg.norm(d, axis=-1), 1e-6)
+            return (n - lengths) * bone_scale, d / n[..., None]
+        def system(places):
+            away, there, z, seen = residuals(places, points.rays, points.turns, points.moves_m)
+            off, ahead = bones(places)
+            # derivative of projection by place
+            by = np.concatenate([np.broadcast_to(np.eye(2), (*seen.shape[:-1], 2, 2)), -seen[..., None]], -1) / z[..., None]
+            by = np.einsum("cmpij,cjk->cmpik", by, points.turns) * scale[..., None]
+            wp, wb = 1.0 / (1.0 + (away / _ROBUST) ** 2), 1.0 / (1.0 + (off / _ROBUST) ** 2)
+            jp = by * wp[..., None]; jb = ahead * (bone_scale * wb)[..., None]
+            return away, off, wp, wb, jp, jb
+        P = len(_NAMES)
+        def normal(jp, jb):
+            N = np.zeros((m, P, 3, P, 3))
+            k = np.arange(P)
+            N[:, k, :, k, :] = np.moveaxis(np.einsum("cmpij,cmpik->mpjk", jp, jp) + 1e-6 * np.eye(3), 1, 0)
+            for b, (i, j) in enumerate(_ENDS):
+                o = jb[:, b, :, None] * jb[:, b, None, :]
+                N[:, i, :, i, :] += o; N[:, j, :, j, :] += o
+                N[:, i, :, j, :] -= o; N[:, j, :, i, :] -= o
+            return N.reshape(m, 3 * P, 3 * P)
+        def gradient(jp, jb, vp, vb):
+            """vp (c m p 2 n), vb (m b n)"""
+            G = np.einsum("cmpij,cmpin->mpjn", jp, vp)
+            for b, (i, j) in enumerate(_ENDS):
+                o = jb[:, b, :, None] * vb[:, b, None, :]
+                G[:, i] += o; G[:, j] -= o
+            return G.reshape(m, 3 * P, -1)
+        def cost(away, off):
+            f=lambda e:(e**2/(1+(e/_ROBUST)**2))
+            return f(away).sum((0,2,3))+f(off).sum(1)
+        lam=np.full(m,1e-3)
+        cur=system(places); c0=cost(cur[0],cur[1])
+        for _ in range(_INNER):
+            away, off, wp, wb, jp, jb = cur
+            N = normal(jp, jb)
+            G = gradient(jp, jb, (wp*away)[..., None], (wb*off)[..., None])
+            D=N.copy(); idx=np.arange(3*P); D[:,idx,idx]*=(1+lam)[:,None]
+            new = places - np.linalg.solve(D, G).reshape(m, P, 3)
+            nxt=system(new); c1=cost(nxt[0],nxt[1])
+            good=c1<=c0
+            places=np.where(good[:,None,None],new,places)
+            lam=np.where(good,lam*0.1,lam*10)
+            c0=np.where(good,c1,c0)
+            cur=system(places)
+        away, off, wp, wb, jp, jb = cur
+        n = len(unknowns)
+        jc_p = np.zeros((*away.shape, n)); jc_b = np.zeros((*off.shape, n))
+        films = unknowns[: self._fixed.size].reshape(-1, _OF_CAMERA)
+        for f in range(len(films)):
+            for q in range(_OF_CAMERA):
+                row = films[f].copy(); row[q] += DIFFERENCE
+                if q == _OFFSET:
+                    if one.seen[f+1] is None: continue
+                    rays = one.seen[f+1].at(one.times_s - row[_OFFSET])[0]
+                    change = -(rays - points.rays[f+1]) * scale[f+1]
+                else:
+                    turn = cv2.Rodrigues(row[_TURN].copy())[0]
+                    there = places @ turn.T + row[_MOVE]
+                    seen = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M)
+                    change = (seen - points.rays[f+1]) * scale[f+1] - away[f+1]
+                jc_p[f+1, ..., f * _OF_CAMERA + q] = change / DIFFERENCE
+        b = np.arange(len(_ENDS))
+        jc_b[:, b, first + _LENGTHS] = -lengths * bone_scale
+        jc_p *= wp[..., None]; jc_b *= wb[..., None]
+        N = normal(jp, jb)
+        S = np.linalg.solve(N, gradient(jp, jb, jc_p, jc_b)).reshape(m, P, 3, n)
+        jc_p -= np.einsum("cmpij,mpjn->cmpin", jp, S)
+        jc_b -= np.einsum("mbj,mbjn->mbn", jb, S[:, _ENDS[:, 0]] - S[:, _ENDS[:, 1]])
+        root = math.sqrt(one.weight)
+        vals = np.concatenate([(wp * away).ravel(), (wb * off).ravel()]) * root
+        jac = np.concatenate([jc_p.reshape(-1, n), jc_b.reshape(-1, n)]) * root
+        self.last.append((places, away, off))
+        return vals, jac, one.weight * cost(away, off).sum(), one.weight * ((away != 0).sum() + (off != 0).sum())
+
+    def _evaluated(self, unknowns):
+        first = self._fixed.size
+        found = []
+        self.last = []
+        for one, far_m in zip(self._moments, self._scales, strict=True):
+            found.append(self._of_person(unknowns, one, far_m, first))
             first += len(_PRIORS)
-        return np.concatenate(rows), np.concatenate(weights), np.concatenate(lengths)
+        return found
 
     def _points(self, values: FloatArray) -> Residuals:
-        """Return residuals of points and bones whose loss is bounded (Geman & McClure, 1985).
+        found = self._evaluated(values[0])
+        return Residuals(np.concatenate([f[0] for f in found])[None], np.concatenate([f[1] for f in found])[None], np.array([sum(f[2] for f in found)]))
 
-        A detector that takes one arm for the other is wrong by any distance.
-        """
-        unknowns = values[0]
-        errors, weights, lengths = self._errors(unknowns)
-        jacobian = np.zeros((len(errors), len(unknowns)))
-        for number in range(self._fixed.size):
-            moved = unknowns.copy()
-            moved[number] += DIFFERENCE
-            jacobian[:, number] = (self._errors(moved)[0] - errors) / DIFFERENCE
-        # Each bone depends on one length alone.
-        moved = unknowns.copy()
-        moved[self._fixed.size :] += DIFFERENCE
-        rows = np.flatnonzero(lengths >= 0)
-        jacobian[rows, lengths[rows]] = (self._errors(moved)[0] - errors)[rows] / DIFFERENCE
-        bounded = 1.0 + (errors / _ROBUST) ** 2
-        costs = np.array([(weights * errors**2 / bounded).sum()])
-        roots = np.sqrt(weights) / bounded
-        return Residuals((roots * errors)[None], (roots[:, None] * jacobian)[None], costs)
+    def count(self, unknowns: FloatArray) -> float:
+        return float(sum(f[3] for f in self._evaluated(unknowns)))
