@@ -85,7 +85,8 @@ _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
 _ROUNDS, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 0.05
-_INNER = 4
+# Steps to the points of an image, and the inverse variance, 1/m^2, that keeps those not seen.
+_INNER, _LOOSE = 4, 1e-6
 _OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
 # Deviation of what is given.
 _GIVEN = 1e-4
@@ -494,34 +495,11 @@ _BONES = np.array(list(_bones()))
 _ENDS, _LENGTHS = _BONES[:, :2], _BONES[:, 2]
 
 
-class _Points(NamedTuple):
-    """Points of a person in m images before c films.
-
-    Attributes:
-        places_m: in the optical frame of the first film, (m, 25, 3).
-        rays: that were seen, (c, m, 25, 2).
-        sure: how sure, (c, m, 25); 0 for a point that fewer than two films show.
-        turns, moves_m: poses of the films, (c, 3, 3) and (c, 3).
-    """
-
-    places_m: FloatArray
-    rays: FloatArray
-    sure: FloatArray
-    turns: FloatArray
-    moves_m: FloatArray
-
-    @property
-    def there_m(self) -> FloatArray:
-        """The places in the optical frame of each film, (c, m, 25, 3)."""
-        turned = np.einsum("cij,mpj->cmpi", self.turns, self.places_m)
-        return turned + self.moves_m[:, None, None]
-
-
 class _Fit:
     """The bundle adjustment of all films.
 
     Its unknowns are 7 of each further film: rotation vector, translation, offset; and of each
-    person the logarithms of the lengths ``_PRIORS``.
+    person the logarithms of the lengths ``_PRIORS``. The points follow from them.
     """
 
     def __init__(
@@ -529,8 +507,10 @@ class _Fit:
     ) -> None:
         """Take which unknowns of the c films are given, (c, 7), and limits of offsets, (2, c)."""
         self._moments, self._fixed, self._offsets_s = moments, fixed, offsets_s
-        self._point = _POINT
-        self._scales: list[FloatArray] = []
+        self._people = [
+            _Person(one, fixed.size, fixed.size + number * len(_PRIORS))
+            for number, one in enumerate(moments)
+        ]
 
     def half(self, number: int) -> _Fit:
         """Return the fit of the first or second half of the images."""
@@ -551,157 +531,170 @@ class _Fit:
         values = np.append(start, mean[len(start) :])
         given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
         inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
-        self._point = point
-        self._scales = [self._scale(values, one) for one in self._moments]
+        for person in self._people:
+            person.scale(values, point)
         low, high = np.full(len(mean), -np.inf), np.full(len(mean), np.inf)
         at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
         low[at], high[at] = self._offsets_s
         rules = rules_of(len(mean), mean=mean, inverse=inverse, low=low, high=high)
-        found = minimize({"points": self._points}, values[None], rules, _ROUNDS, _LEAST_GAIN)
+        found = minimize({"points": self._residuals}, values[None], rules, _ROUNDS, _LEAST_GAIN)
         return found.values[0], found
 
     def count(self, unknowns: FloatArray) -> float:
         """Return the number of residuals, each with its weight."""
-        errors, weights, _ = self._errors(unknowns)
-        return float(weights[errors != 0.0].sum())
+        return sum(person.count(unknowns) for person in self._people)
 
-    def _triangulated(self, unknowns: FloatArray, one: _Moments) -> _Points:
-        films = unknowns[: self._fixed.size].reshape(-1, _OF_CAMERA)
-        films = np.vstack([np.zeros(_OF_CAMERA), films])
+    def _residuals(self, values: FloatArray) -> Residuals:
+        every = [person.residuals(values[0]) for person in self._people]
+        errors, jacobian, costs = zip(*every, strict=True)
+        return Residuals(
+            np.concatenate(errors, axis=1), np.concatenate(jacobian, axis=1), np.sum(costs, axis=0)
+        )
+
+
+class _Person:
+    """One person in the bundle adjustment, in m images before c films."""
+
+    def __init__(self, moments: _Moments, films: int, first: int) -> None:
+        """Take the numbers of the unknowns of all films, and of the person's first length."""
+        self._moments, self._films = moments, films
+        self._lengths = first + _LENGTHS
+        self._own = [*range(films), *range(first, first + len(_PRIORS))]
+        self._scale: FloatArray = np.ones(1)
+
+    def scale(self, unknowns: FloatArray, point: float) -> None:
+        """Take the inverse deviations of rays from distances at unknowns.
+
+        They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
+        is the deviation of a point, statures.
+        """
+        sure = self._seen(unknowns)[1]
+        depth_m = self._before(unknowns, self._triangulated(unknowns))[..., 2]
+        is_seen = (sure > 0.0) & (depth_m > _NEAREST_M)
+        count = is_seen.sum(axis=2)
+        far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
+        far_m = np.where(count > 0, far_m, 1.0)
+        self._scale = far_m[..., None, None] / (point * self._moments.stature_m)
+
+    def count(self, unknowns: FloatArray) -> float:
+        """Return the number of residuals, each with its weight."""
+        sure = self._seen(unknowns)[1]
+        return self._moments.weight * float(2 * (sure > 0.0).sum() + self._are_whole(sure).sum())
+
+    def residuals(self, unknowns: FloatArray) -> Residuals:
+        """Return residuals at the points (m, 25, 3) with the least cost for the unknowns (n,).
+
+        The loss is bounded (Geman & McClure, 1985): a detector that takes one arm for the other is
+        wrong by any distance. The Jacobian has what the points cannot make up for (Golub & Pereyra,
+        "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
+        separate", 1973, as Kaufman shortens it).
+        """
+
+        def of_points(places: FloatArray) -> Residuals:
+            errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
+            return _bounded(errors, slopes)
+
+        begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
+        rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
+        found = minimize({"points": of_points}, begun, rules, _INNER)
+        places = found.values.reshape(-1, len(_NAMES), 3)
+        errors, slopes = self._linearized(unknowns, places)
+        changes = np.zeros((*errors.shape, len(unknowns)))
+        for number in self._own:
+            moved = unknowns.copy()
+            moved[number] += DIFFERENCE
+            changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
+        values, slopes, costs = _bounded(errors, slopes)
+        changes = _bounded(errors, changes).jacobian
+        made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
+        jacobian = (changes - slopes @ made_up).reshape(1, -1, len(unknowns))
+        root = math.sqrt(self._moments.weight)
+        assert costs is not None
+        total = self._moments.weight * costs.sum(keepdims=True)
+        return Residuals(root * values.reshape(1, -1), root * jacobian, total)
+
+    def _poses(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return rotations (c, 3, 3), translations (c, 3) and offsets (c,) of all films."""
+        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
         turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
-        shape = len(one.times_s), len(_NAMES)
-        rays, sure = np.zeros((len(films), *shape, 2)), np.zeros((len(films), *shape))
-        for number, (seen, film) in enumerate(zip(one.seen, films, strict=True)):
-            if seen is not None:
-                rays[number], sure[number] = seen.at(one.times_s - film[_OFFSET])
-        sure *= (sure > 0.0).sum(axis=0) > 1
+        return turns, films[:, _MOVE], films[:, _OFFSET]
+
+    def _seen(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return rays (c, m, 25, 2), and how sure they are, (c, m, 25).
+
+        A point that fewer than two films show is not sure.
+        """
+        one, shape = self._moments, (len(self._moments.times_s), len(_NAMES))
+        seen = [
+            (np.zeros((*shape, 2)), np.zeros(shape))
+            if each is None
+            else each.at(one.times_s - late_s)
+            for each, late_s in zip(one.seen, self._poses(unknowns)[2], strict=True)
+        ]
+        rays, sure = (np.array(each) for each in zip(*seen, strict=True))
+        return rays, sure * ((sure > 0.0).sum(axis=0) > 1)
+
+    def _are_whole(self, sure: FloatArray) -> BoolArray:
+        """Return which bones are seen, (m, b)."""
+        return np.asarray((sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1))
+
+    def _triangulated(self, unknowns: FloatArray) -> FloatArray:
+        """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
+        (turns, moves_m, _), (rays, sure) = self._poses(unknowns), self._seen(unknowns)
         ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
         ahead = np.einsum("cji,cmpj->cmpi", turns, ahead)
         ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-        # A point has the least sum of squared distances from its rays.
         across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
         across *= (sure**2)[..., None, None]
-        centres = -np.einsum("cji,cj->ci", turns, films[:, _MOVE])
+        centres = -np.einsum("cji,cj->ci", turns, moves_m)
         right = np.einsum("cmpij,cj->mpi", across, centres)
         loose = across.sum(axis=0) + 1e-9 * np.eye(3)
-        places_m = np.linalg.solve(loose, right[..., None])[..., 0]
-        return _Points(places_m, rays, sure, turns, films[:, _MOVE])
+        return np.linalg.solve(loose, right[..., None])[..., 0]
 
-    def _scale(self, unknowns: FloatArray, one: _Moments) -> FloatArray:
-        """Return distances to each film, (c, m, 1, 1), m.
+    def _before(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+        """Return the places in the optical frame of each film, (c, m, 25, 3)."""
+        turns, moves_m, _ = self._poses(unknowns)
+        there: FloatArray = np.einsum("cij,mpj->cmpi", turns, places) + moves_m[:, None, None]
+        return there
 
-        They stay while the unknowns change: otherwise a smaller scene would fit better.
-        """
-        points = self._triangulated(unknowns, one)
-        depth_m = points.there_m[..., 2]
-        is_seen = (points.sure > 0.0) & (depth_m > _NEAREST_M)
-        count = is_seen.sum(axis=2)
-        far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
-        return np.where(count > 0, far_m, 1.0)[..., None, None]
+    def _errors(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+        """Return the errors of rays, then of bones, in deviations, (m, r)."""
+        rays, sure = self._seen(unknowns)
+        there = self._before(unknowns, places)
+        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - rays
+        away *= self._scale * sure[..., None]
+        bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
+        off = np.linalg.norm(bones, axis=-1) - np.exp(unknowns[self._lengths])
+        off *= self._are_whole(sure) / (_BONE * self._moments.stature_m)
+        return np.hstack([away.swapaxes(0, 1).reshape(len(places), -1), off])
 
-    def _of_person(self, unknowns, one, far_m, first):
-        """Return residuals, Jacobian (R, n)."""
-        points = self._triangulated(unknowns, one)
-        places = points.places_m
-        m = len(places)
-        scale = far_m / (self._point * one.stature_m) * points.sure[..., None]   # c m p 1
-        bone_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
-        lengths = np.exp(unknowns[first + _LENGTHS])
-        bone_scale = bone_seen / (_BONE * one.stature_m)
-        def residuals(places, rays, turns, moves):
-            there = np.einsum("cij,mpj->cmpi", turns, places) + moves[:, None, None]
-            z = np.maximum(there[..., 2:], _NEAREST_M)
-            seen = there[..., :2] / z
-            return (seen - rays) * scale, there, z, seen
-        def bones(places):
-            d = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
-            n = np.maximum(np.linalg.norm(d, axis=-1), 1e-6)
-            return (n - lengths) * bone_scale, d / n[..., None]
-        def system(places):
-            away, there, z, seen = residuals(places, points.rays, points.turns, points.moves_m)
-            off, ahead = bones(places)
-            # derivative of projection by place
-            by = np.concatenate([np.broadcast_to(np.eye(2), (*seen.shape[:-1], 2, 2)), -seen[..., None]], -1) / z[..., None]
-            by = np.einsum("cmpij,cjk->cmpik", by, points.turns) * scale[..., None]
-            wp, wb = 1.0 / (1.0 + (away / _ROBUST) ** 2), 1.0 / (1.0 + (off / _ROBUST) ** 2)
-            jp = by * wp[..., None]; jb = ahead * (bone_scale * wb)[..., None]
-            return away, off, wp, wb, jp, jb
-        P = len(_NAMES)
-        def normal(jp, jb):
-            N = np.zeros((m, P, 3, P, 3))
-            k = np.arange(P)
-            N[:, k, :, k, :] = np.moveaxis(np.einsum("cmpij,cmpik->mpjk", jp, jp) + 1e-6 * np.eye(3), 1, 0)
-            for b, (i, j) in enumerate(_ENDS):
-                o = jb[:, b, :, None] * jb[:, b, None, :]
-                N[:, i, :, i, :] += o; N[:, j, :, j, :] += o
-                N[:, i, :, j, :] -= o; N[:, j, :, i, :] -= o
-            return N.reshape(m, 3 * P, 3 * P)
-        def gradient(jp, jb, vp, vb):
-            """vp (c m p 2 n), vb (m b n)"""
-            G = np.einsum("cmpij,cmpin->mpjn", jp, vp)
-            for b, (i, j) in enumerate(_ENDS):
-                o = jb[:, b, :, None] * vb[:, b, None, :]
-                G[:, i] += o; G[:, j] -= o
-            return G.reshape(m, 3 * P, -1)
-        def cost(away, off):
-            f=lambda e:(e**2/(1+(e/_ROBUST)**2))
-            return f(away).sum((0,2,3))+f(off).sum(1)
-        lam=np.full(m,1e-3)
-        cur=system(places); c0=cost(cur[0],cur[1])
-        for _ in range(_INNER):
-            away, off, wp, wb, jp, jb = cur
-            N = normal(jp, jb)
-            G = gradient(jp, jb, (wp*away)[..., None], (wb*off)[..., None])
-            D=N.copy(); idx=np.arange(3*P); D[:,idx,idx]*=(1+lam)[:,None]
-            new = places - np.linalg.solve(D, G).reshape(m, P, 3)
-            nxt=system(new); c1=cost(nxt[0],nxt[1])
-            good=c1<=c0
-            places=np.where(good[:,None,None],new,places)
-            lam=np.where(good,lam*0.1,lam*10)
-            c0=np.where(good,c1,c0)
-            cur=system(places)
-        away, off, wp, wb, jp, jb = cur
-        n = len(unknowns)
-        jc_p = np.zeros((*away.shape, n)); jc_b = np.zeros((*off.shape, n))
-        films = unknowns[: self._fixed.size].reshape(-1, _OF_CAMERA)
-        for f in range(len(films)):
-            for q in range(_OF_CAMERA):
-                row = films[f].copy(); row[q] += DIFFERENCE
-                if q == _OFFSET:
-                    if one.seen[f+1] is None: continue
-                    rays = one.seen[f+1].at(one.times_s - row[_OFFSET])[0]
-                    change = -(rays - points.rays[f+1]) * scale[f+1]
-                else:
-                    turn = cv2.Rodrigues(row[_TURN].copy())[0]
-                    there = places @ turn.T + row[_MOVE]
-                    seen = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M)
-                    change = (seen - points.rays[f+1]) * scale[f+1] - away[f+1]
-                jc_p[f+1, ..., f * _OF_CAMERA + q] = change / DIFFERENCE
-        b = np.arange(len(_ENDS))
-        jc_b[:, b, first + _LENGTHS] = -lengths * bone_scale
-        jc_p *= wp[..., None]; jc_b *= wb[..., None]
-        N = normal(jp, jb)
-        S = np.linalg.solve(N, gradient(jp, jb, jc_p, jc_b)).reshape(m, P, 3, n)
-        jc_p -= np.einsum("cmpij,mpjn->cmpin", jp, S)
-        jc_b -= np.einsum("mbj,mbjn->mbn", jb, S[:, _ENDS[:, 0]] - S[:, _ENDS[:, 1]])
-        root = math.sqrt(one.weight)
-        vals = np.concatenate([(wp * away).ravel(), (wb * off).ravel()]) * root
-        jac = np.concatenate([jc_p.reshape(-1, n), jc_b.reshape(-1, n)]) * root
-        self.last.append((places, away, off))
-        return vals, jac, one.weight * cost(away, off).sum(), one.weight * ((away != 0).sum() + (off != 0).sum())
+    def _linearized(
+        self, unknowns: FloatArray, places: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the errors (m, r), and their derivatives by the places, (m, r, 75)."""
+        turns, sure = self._poses(unknowns)[0], self._seen(unknowns)[1]
+        there = self._before(unknowns, places)
+        ahead = np.maximum(there[..., 2:], _NEAREST_M)
+        by_there = np.zeros((*there.shape[:-1], 2, 3))
+        by_there[..., :2] = np.eye(2)
+        by_there[..., 2] = -there[..., :2] / ahead
+        by_there *= (self._scale * sure[..., None] / ahead)[..., None]
+        of_rays = np.zeros((len(places), len(turns), len(_NAMES), 2, len(_NAMES), 3))
+        each, bone = np.arange(len(_NAMES)), np.arange(len(_ENDS))
+        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, turns)
+        bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
+        bones /= np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
+        bones *= (self._are_whole(sure) / (_BONE * self._moments.stature_m))[..., None]
+        of_bones = np.zeros((len(places), len(bone), len(_NAMES), 3))
+        of_bones[:, bone, _ENDS[:, 0]], of_bones[:, bone, _ENDS[:, 1]] = bones, -bones
+        shape = len(places), -1, 3 * len(_NAMES)
+        slopes = np.hstack([of_rays.reshape(shape), of_bones.reshape(shape)])
+        return self._errors(unknowns, places), slopes
 
-    def _evaluated(self, unknowns):
-        first = self._fixed.size
-        found = []
-        self.last = []
-        for one, far_m in zip(self._moments, self._scales, strict=True):
-            found.append(self._of_person(unknowns, one, far_m, first))
-            first += len(_PRIORS)
-        return found
 
-    def _points(self, values: FloatArray) -> Residuals:
-        found = self._evaluated(values[0])
-        return Residuals(np.concatenate([f[0] for f in found])[None], np.concatenate([f[1] for f in found])[None], np.array([sum(f[2] for f in found)]))
-
-    def count(self, unknowns: FloatArray) -> float:
-        return float(sum(f[3] for f in self._evaluated(unknowns)))
+def _bounded(errors: FloatArray, jacobian: FloatArray) -> Residuals:
+    """Return residuals (N, R) with the loss of Geman & McClure; the Jacobian is (N, R, n)."""
+    bounded = 1.0 + (errors / _ROBUST) ** 2
+    return Residuals(
+        errors / bounded, jacobian / bounded[..., None], (errors**2 / bounded).sum(axis=1)
+    )
