@@ -149,8 +149,8 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
         raise CameraError(
             f"the extrinsics of camera {other} relative to {first} are unknown: expected a "
             "rectified pair (P[0,3] of CameraInfo), a rigid transform between their optical frames "
-            "on /tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
-            "nodes extrinsics_file"
+            "on /tf_static, or a file from Kalibr, aniposelib or OpenCV; give --extrinsics FILE, "
+            "or the nodes extrinsics_file"
         )
     apart_m = float(np.linalg.norm(there[0].centre_m))
     if not apart_m <= FARTHEST_M:

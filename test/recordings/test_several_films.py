@@ -169,7 +169,7 @@ def test_people_of_two_films_are_found_in_each_other() -> None:
 
 def test_two_people_show_an_offset_that_neither_shows_alone() -> None:
     true = other_camera(120.0)
-    given = {"noise_px": 2.0, "seconds": 1.0}
+    given = {"noise_px": 3.0, "seconds": 1.2}
     one = [film("a", FIRST, 0.0, 30.0, seed, **given).people[0] for seed in (1, 2)]
     two = [film("b", true, 0.1, 30.0, seed, **given).people[0] for seed in (1, 2)]
     for ours, theirs in zip(one, two, strict=True):
