@@ -45,7 +45,7 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     with foreign(path, CameraError, _EXPECTED):
         text = read_small_text(path)
         is_toml = os.fspath(path).lower().endswith(".toml")
-        data = _of_aniposelib(tomllib.loads(text)) if is_toml else _parsed(text)
+        data = _of_aniposelib(tomllib.loads(text)) if is_toml else parsed_storage(text)
         if not isinstance(data, Mapping):
             raise CameraError("it is no mapping")
         is_camchain = all(isinstance(one, Mapping) and "intrinsics" in one for one in data.values())
@@ -93,7 +93,11 @@ def save_calibration(path: str | os.PathLike[str], calibration: Calibration) -> 
     write_file(path, "\n".join(lines) + "\n")
 
 
-def _parsed(text: str) -> Any:
+def parsed_storage(text: str) -> Any:
+    """Return what YAML or XML has, of OpenCV's FileStorage or others; SmallYamlError if it is none.
+
+    A matrix is a mapping with ``data``, or, in XML, its numbers as words.
+    """
     if not text.lstrip().startswith("<"):
         data = parse_small_yaml(_NO_YAML.sub("", text))
         is_storage = "opencv-matrix" in text and isinstance(data, dict)

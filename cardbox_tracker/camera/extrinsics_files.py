@@ -1,8 +1,8 @@
 """Reads extrinsics from CameraInfo, ``/tf_static`` and files, chooses one, and writes camchains.
 
 The projection matrices of a rectified pair come first, then the transforms on ``/tf_static``, then
-a file: a camchain of Kalibr (YAML) or a camera group of aniposelib (TOML). All sources that are
-present have to agree.
+a file: a camchain of Kalibr (YAML), a camera group of aniposelib (TOML) or what OpenCV's
+stereoCalibrate finds (FileStorage). All sources that are present have to agree.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from cardbox_tracker.camera.calibration_file import parsed_storage
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.camera_info import info_array
 from cardbox_tracker.camera.extrinsics import FARTHEST_M, Extrinsics
 from cardbox_tracker.common.errors import CameraError, cut
 from cardbox_tracker.common.files import foreign, write_file
-from cardbox_tracker.common.small_yaml import parse_small_yaml, read_small_text
+from cardbox_tracker.common.small_yaml import read_small_text
 
 # Two sources that differ by more do not belong to the same calibration.
 _AGREE_DEG, _AGREE_M = 1.0, 0.02
@@ -148,8 +149,8 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
         raise CameraError(
             f"the extrinsics of camera {other} relative to {first} are unknown: expected a "
             "rectified pair (P[0,3] of CameraInfo), a rigid transform between their optical frames "
-            "on /tf_static, or a file from Kalibr or aniposelib; give --extrinsics FILE, or the "
-            "nodes extrinsics_file"
+            "on /tf_static, or a file from Kalibr, aniposelib or OpenCV; give --extrinsics FILE, "
+            "or the nodes extrinsics_file"
         )
     there[0].check()
     apart_m = float(np.linalg.norm(there[0].centre_m))
@@ -169,26 +170,35 @@ def choose(found: Sequence[Extrinsics | None], first: str, other: str) -> Extrin
     return there[0]
 
 
-_EXPECTED = "a camchain of Kalibr (YAML with T_cn_cnm1) or a camera group of aniposelib (TOML)"
+_EXPECTED = (
+    "a camchain of Kalibr (YAML with T_cn_cnm1), a camera group of aniposelib (TOML), or, of two "
+    "cameras, R and T of OpenCV's stereoCalibrate (FileStorage)"
+)
 
 
 def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dict[str, Extrinsics]:
     """Return the extrinsics of each further camera relative to the first one, by its name.
 
-    The file is a camchain of Kalibr or a TOML file of aniposelib. A camera is found by its name in
-    it; in a camchain the first part of its ``rostopic`` is a name, too, and counts if it is another
-    camera's key. Lengths are metres; a TOML file whose cameras would be more than 30 m apart is
-    read as millimetres.
+    The file is a camchain of Kalibr, a TOML file of aniposelib, or YAML, XML or JSON of OpenCV's
+    FileStorage with R and T, the pose of the second of two cameras. In the first two, a camera is
+    found by its name; in a camchain the first part of its ``rostopic`` is a name, too, and counts
+    if it is another camera's key. Lengths are metres; a file of aniposelib or OpenCV whose cameras
+    would be more than 30 m apart is read as millimetres.
 
     Raises CameraError if the file cannot be read, lacks a camera, or has no rigid transforms.
     """
     name = os.fspath(path)
     with foreign(path, CameraError, _EXPECTED):
         text = read_small_text(path)
-        data = tomllib.loads(text) if name.endswith(".toml") else parse_small_yaml(text)
+        data = tomllib.loads(text) if name.endswith(".toml") else parsed_storage(text)
         entries = data if isinstance(data, Mapping) else {}
         entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
-        poses = _aniposelib(entries, name) if name.endswith(".toml") else _camchain(entries, name)
+        if name.endswith(".toml"):
+            poses = _metres(_aniposelib(entries, name))
+        elif isinstance(data, Mapping) and {"R", "T"} <= data.keys():
+            poses = _metres(_stereo(data, name, cameras))
+        else:
+            poses = _camchain(entries, name)
     missing = [camera for camera in cameras if camera.strip("/") not in poses]
     if missing:
         raise CameraError(
@@ -255,18 +265,36 @@ def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, 
 
 def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
     """Return transforms from the world frame of the file into each camera, by name."""
-    poses = {
+    return {
         str(entry.get("name", key)): Extrinsics.of_vectors(
             entry["rotation"], entry["translation"], f"{name}, {key}"
         )
         for key, entry in entries.items()
         if "rotation" in entry and "translation" in entry
     }
+
+
+def _stereo(data: Mapping[str, Any], name: str, cameras: Sequence[str]) -> dict[str, Extrinsics]:
+    """Return the poses of two cameras, which the file does not name."""
+    if len(cameras) != 2:
+        raise CameraError(
+            f"the extrinsics {name} have R and T, the pose of one further camera; expected that of "
+            f"{len(cameras) - 1}: give {_EXPECTED}"
+        )
+    values = (data[key] for key in "RT")
+    turn, move = (
+        np.array(one["data"] if isinstance(one, Mapping) else one, np.float64) for one in values
+    )
+    matrix = np.column_stack([turn.reshape(3, 3), move.reshape(3)])
+    poses = Extrinsics(np.eye(3), np.zeros(3)), Extrinsics.of(matrix, f"{name}, R and T")
+    return {camera.strip("/"): pose for camera, pose in zip(cameras, poses, strict=True)}
+
+
+def _metres(poses: dict[str, Extrinsics]) -> dict[str, Extrinsics]:
+    """Return the poses in metres: boards are usually given in millimetres."""
     centres = np.array([pose.centre_m for pose in poses.values()]).reshape(-1, 3)
-    # aniposelib uses the unit of its board, usually millimetres.
-    if len(centres) and np.ptp(centres, axis=0).max() > FARTHEST_M:
-        return {
-            key: Extrinsics(pose.rotation, pose.translation_m / 1000.0, pose.source)
-            for key, pose in poses.items()
-        }
-    return poses
+    scale = 1000.0 if len(poses) and np.ptp(centres, axis=0).max() > FARTHEST_M else 1.0
+    return {
+        key: Extrinsics(pose.rotation, pose.translation_m / scale, pose.source)
+        for key, pose in poses.items()
+    }

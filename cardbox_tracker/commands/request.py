@@ -139,8 +139,8 @@ class RecordingOptions(Options):
         background: seconds during which nobody is in view
         cameras: cameras of the recording that see the person, such as cam0 cam1, the one that the
             person faced first; with one name, that camera alone
-        extrinsics: where further cameras stand, from Kalibr (YAML) or aniposelib (TOML), if the
-            recording does not tell
+        extrinsics: where further cameras stand, from Kalibr (YAML), aniposelib (TOML) or OpenCV's
+            stereoCalibrate (FileStorage), if the recording does not tell
         depth: depth images of the same view as the first of --cameras; 'stereo' measures depth in
             the first two of them, a rectified pair, left first
         within_m: in place of --background: all that is nearer in the images of --depth, metres, is

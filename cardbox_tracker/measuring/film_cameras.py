@@ -5,11 +5,12 @@ vertical speeds in the images, summed over joints, shows how much later a film b
 one film is who in another.
 
 Times and poses then follow from one robust least-squares problem, a bundle adjustment (Triggs et
-al., "Bundle adjustment - a modern synthesis", 2000) whose points are triangulated in each step. Its
-unknowns are rotation, translation and offset of each further film, and the logarithms of the
-lengths of each person's bones. The priors of these are the proportions of people of the stature,
-which give the scale. Residuals are distances between rays and triangulated points, and differences
-of bones in each image from their lengths.
+al., "Bundle adjustment - a modern synthesis", 2000). Its unknowns are rotation, translation and
+offset of each further film, the logarithms of the lengths of each person's bones, and the points in
+each image, which are eliminated. The priors of the lengths are the proportions of people of the
+stature, which give the scale. Residuals are distances between rays and points, and differences of
+bones in each image from their lengths. If points were only triangulated, noise of their depth would
+draw cameras apart, where it is less.
 """
 
 from __future__ import annotations
@@ -79,11 +80,14 @@ _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
 _COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
 # Residual from which on it counts less, deviations.
 _ROBUST = 2.0
+_FACE, _EARS = slice(0, 3), slice(3, 5)
 # How much further than its partner of the other side a joint is if the body hides it, m.
 _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
 _ROUNDS, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 0.05
+# Steps to the points of an image, and the inverse variance, 1/m^2, that keeps those not seen.
+_INNER, _LOOSE = 4, 1e-6
 _OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
 # Deviation of what is given.
 _GIVEN = 1e-4
@@ -107,7 +111,13 @@ class Seen:
         self.times_s = np.array([time_s for time_s, _ in sightings])
         known = (scores >= _LEAST_SCORE) & is_inside(px, camera)
         self.rays = np.where(known[..., None], camera.rays(px)[..., :2], 0.0)
+        is_exchanged = _are_exchanged(self.rays, known)
+        for values in (self.rays, known, self.spatial_m):
+            values[is_exchanged] = values[is_exchanged][:, _OTHER_SIDE]
         behind_m = self.spatial_m[..., 2] - self.spatial_m[:, _OTHER_SIDE, 2]
+        # The head hides the face of who looks away.
+        away_m = self.spatial_m[:, _FACE, 2] - self.spatial_m[:, _EARS, 2].mean(axis=1)[:, None]
+        behind_m[:, _FACE] = np.fmax(behind_m[:, _FACE], away_m)
         hidden = np.clip(np.nan_to_num(behind_m) / _FAR_SIDE_M, 0.0, 1.0)
         self.sure = known / (1.0 + (_HIDDEN - 1.0) * hidden)
         self.period_s = float(np.median(np.diff(self.times_s)))
@@ -137,6 +147,19 @@ class Seen:
         deviation = np.sqrt((speeds**2).sum(axis=0) / count)
         speeds = np.clip(speeds / np.maximum(deviation, 1e-9), -_MOST_SPEED, _MOST_SPEED)
         return speeds, known.astype(np.float64)
+
+
+def _are_exchanged(rays: FloatArray, known: BoolArray) -> BoolArray:
+    """Return in which of n images a detector takes left for right, unlike in most of them, (n,)."""
+    is_exchanged, last, ever = np.zeros(len(rays), np.bool_), rays[0].copy(), known[0].copy()
+    for number, (now, seen) in enumerate(zip(rays, known, strict=True)):
+        both = seen & seen[_OTHER_SIDE] & ever
+        moved = [np.linalg.norm(one - last, axis=1)[both].sum() for one in (now, now[_OTHER_SIDE])]
+        is_exchanged[number] = moved[1] < moved[0]
+        if is_exchanged[number]:
+            now, seen = now[_OTHER_SIDE], seen[_OTHER_SIDE]
+        last, ever = np.where(seen[:, None], now, last), ever | seen
+    return is_exchanged ^ bool(is_exchanged.mean() > 0.5)
 
 
 def _all_points(points: ImagePoints) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -332,7 +355,11 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
 
 
 def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]]:
-    """Yield likely offsets of a film, s, to half an image, s, and who is who."""
+    """Yield likely offsets of a film, s, within which time they are, s, and who is who.
+
+    Also whether the offset is given, or surely none of chance. Speeds of people whom one camera
+    sees from behind and above agree best up to 0.1 s beside the offset.
+    """
     periods_s = [one.period_s for one in (*first.people, *film.people)]
     step_s = max(periods_s, default=1.0) / 2.0
     curves = {
@@ -340,26 +367,30 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
         for a, one in enumerate(first.people)
         for b, other in enumerate(film.people)
     }
+    is_given = film.offset_s is not None
     tried = [] if film.offset_s is None else [film.offset_s]
-    for lags, sure in curves.values() if film.offset_s is None else ():
+    for lags, sure in () if is_given else curves.values():
         peaks = 1 + np.flatnonzero((sure[1:-1] > sure[:-2]) & (sure[1:-1] >= sure[2:]))
-        tried += lags[peaks[sure[peaks] > _SURE]].tolist()
+        tried += lags[peaks[sure[peaks] > 0.0]].tolist()
     found = list[tuple[float, float, Who]]()
     for offset_s in tried:
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
             gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
-        pairs = list(zip(*linear_sum_assignment(-gains), strict=True))
-        same = {int(a): int(b) for a, b in pairs if gains[a, b] > 0.0}
-        if same:
+        pairs = sorted(zip(*linear_sum_assignment(-gains), strict=True), key=lambda at: -gains[at])
+        # Chance gives each of them its own.
+        together = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
+        if together.max(initial=0.0) > (0.0 if is_given else _SURE):
+            most = int(np.argmax(together))
+            same = {int(a): int(b) for a, b in pairs[: most + 1]}
             who = tuple(same.get(a) for a in range(len(first.people)))
-            found.append((sum(gains[pair] for pair in pairs), offset_s, who))
+            found.append((float(together[most]), offset_s, who))
     taken = list[float]()
-    is_given = film.offset_s is not None
     for alike, offset_s, who in sorted(found, key=lambda one: -one[0]):
         if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
             taken.append(offset_s)
-            yield offset_s, 0.0 if is_given else step_s, who, is_given or bool(alike > _CLEAR)
+            within_s = 0.0 if is_given else max(step_s, _APART_S / 2.0)
+            yield offset_s, within_s, who, is_given or bool(alike > _CLEAR)
 
 
 def _starts(
@@ -469,29 +500,11 @@ _BONES = np.array(list(_bones()))
 _ENDS, _LENGTHS = _BONES[:, :2], _BONES[:, 2]
 
 
-class _Points(NamedTuple):
-    """Triangulated points in m images.
-
-    Attributes:
-        places_m: in the optical frame of the first of c films, (m, 25, 3).
-        there_m: in that of each film, (c, m, 25, 3).
-        rays: that were seen, (c, m, 25, 2).
-        sure: how sure, (c, m, 25); 0 for a point that fewer than two films show.
-        matrix: of the normal equations of each point, (m, 25, 3, 3).
-    """
-
-    places_m: FloatArray
-    there_m: FloatArray
-    rays: FloatArray
-    sure: FloatArray
-    matrix: FloatArray
-
-
 class _Fit:
     """The bundle adjustment of all films.
 
     Its unknowns are 7 of each further film: rotation vector, translation, offset; and of each
-    person the logarithms of the lengths ``_PRIORS``.
+    person the logarithms of the lengths ``_PRIORS``. The points follow from them.
     """
 
     def __init__(
@@ -499,8 +512,10 @@ class _Fit:
     ) -> None:
         """Take which unknowns of the c films are given, (c, 7), and limits of offsets, (2, c)."""
         self._moments, self._fixed, self._offsets_s = moments, fixed, offsets_s
-        self._point = _POINT
-        self._scales: list[tuple[FloatArray, FloatArray]] = []
+        self._people = [
+            _Person(one, fixed.size, fixed.size + number * len(_PRIORS))
+            for number, one in enumerate(moments)
+        ]
 
     def half(self, number: int) -> _Fit:
         """Return the fit of the first or second half of the images."""
@@ -521,96 +536,170 @@ class _Fit:
         values = np.append(start, mean[len(start) :])
         given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
         inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
-        self._point = point
-        self._scales = [self._scale(values, one) for one in self._moments]
+        for person in self._people:
+            person.scale(values, point)
         low, high = np.full(len(mean), -np.inf), np.full(len(mean), np.inf)
         at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
         low[at], high[at] = self._offsets_s
         rules = rules_of(len(mean), mean=mean, inverse=inverse, low=low, high=high)
-        found = minimize({"points": self._points}, values[None], rules, _ROUNDS, _LEAST_GAIN)
+        found = minimize({"points": self._residuals}, values[None], rules, _ROUNDS, _LEAST_GAIN)
         return found.values[0], found
 
     def count(self, unknowns: FloatArray) -> float:
         """Return the number of residuals, each with its weight."""
-        errors, weights, _ = self._errors(unknowns)
-        return float(weights[errors != 0.0].sum())
+        return sum(person.count(unknowns) for person in self._people)
 
-    def _triangulated(self, unknowns: FloatArray, one: _Moments) -> _Points:
-        films = unknowns[: self._fixed.size].reshape(-1, _OF_CAMERA)
-        films = np.vstack([np.zeros(_OF_CAMERA), films])
+    def _residuals(self, values: FloatArray) -> Residuals:
+        every = [person.residuals(values[0]) for person in self._people]
+        errors, jacobian, costs = zip(*every, strict=True)
+        return Residuals(
+            np.concatenate(errors, axis=1), np.concatenate(jacobian, axis=1), np.sum(costs, axis=0)
+        )
+
+
+class _Person:
+    """One person in the bundle adjustment, in m images before c films."""
+
+    def __init__(self, moments: _Moments, films: int, first: int) -> None:
+        """Take the numbers of the unknowns of all films, and of the person's first length."""
+        self._moments, self._films = moments, films
+        self._lengths = first + _LENGTHS
+        self._own = [*range(films), *range(first, first + len(_PRIORS))]
+        self._scale: FloatArray = np.ones(1)
+
+    def scale(self, unknowns: FloatArray, point: float) -> None:
+        """Take the inverse deviations of rays from distances at unknowns.
+
+        They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
+        is the deviation of a point, statures.
+        """
+        sure = self._seen(unknowns)[1]
+        depth_m = self._before(unknowns, self._triangulated(unknowns))[..., 2]
+        is_seen = (sure > 0.0) & (depth_m > _NEAREST_M)
+        count = is_seen.sum(axis=2)
+        far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
+        far_m = np.where(count > 0, far_m, 1.0)
+        self._scale = far_m[..., None, None] / (point * self._moments.stature_m)
+
+    def count(self, unknowns: FloatArray) -> float:
+        """Return the number of residuals, each with its weight."""
+        sure = self._seen(unknowns)[1]
+        return self._moments.weight * float(2 * (sure > 0.0).sum() + self._are_whole(sure).sum())
+
+    def residuals(self, unknowns: FloatArray) -> Residuals:
+        """Return residuals at the points (m, 25, 3) with the least cost for the unknowns (n,).
+
+        The loss is bounded (Geman & McClure, 1985): a detector that takes one arm for the other is
+        wrong by any distance. The Jacobian has what the points cannot make up for (Golub & Pereyra,
+        "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
+        separate", 1973, as Kaufman shortens it).
+        """
+
+        def of_points(places: FloatArray) -> Residuals:
+            errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
+            return _bounded(errors, slopes)
+
+        begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
+        rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
+        found = minimize({"points": of_points}, begun, rules, _INNER)
+        places = found.values.reshape(-1, len(_NAMES), 3)
+        errors, slopes = self._linearized(unknowns, places)
+        changes = np.zeros((*errors.shape, len(unknowns)))
+        for number in self._own:
+            moved = unknowns.copy()
+            moved[number] += DIFFERENCE
+            changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
+        values, slopes, costs = _bounded(errors, slopes)
+        changes = _bounded(errors, changes).jacobian
+        made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
+        jacobian = (changes - slopes @ made_up).reshape(1, -1, len(unknowns))
+        root = math.sqrt(self._moments.weight)
+        assert costs is not None
+        total = self._moments.weight * costs.sum(keepdims=True)
+        return Residuals(root * values.reshape(1, -1), root * jacobian, total)
+
+    def _poses(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return rotations (c, 3, 3), translations (c, 3) and offsets (c,) of all films."""
+        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
         turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
-        shape = len(one.times_s), len(_NAMES)
-        rays, sure = np.zeros((len(films), *shape, 2)), np.zeros((len(films), *shape))
-        for number, (seen, film) in enumerate(zip(one.seen, films, strict=True)):
-            if seen is not None:
-                rays[number], sure[number] = seen.at(one.times_s - film[_OFFSET])
-        sure *= (sure > 0.0).sum(axis=0) > 1
+        return turns, films[:, _MOVE], films[:, _OFFSET]
+
+    def _seen(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return rays (c, m, 25, 2), and how sure they are, (c, m, 25).
+
+        A point that fewer than two films show is not sure.
+        """
+        one, shape = self._moments, (len(self._moments.times_s), len(_NAMES))
+        seen = [
+            (np.zeros((*shape, 2)), np.zeros(shape))
+            if each is None
+            else each.at(one.times_s - late_s)
+            for each, late_s in zip(one.seen, self._poses(unknowns)[2], strict=True)
+        ]
+        rays, sure = (np.array(each) for each in zip(*seen, strict=True))
+        return rays, sure * ((sure > 0.0).sum(axis=0) > 1)
+
+    def _are_whole(self, sure: FloatArray) -> BoolArray:
+        """Return which bones are seen, (m, b)."""
+        return np.asarray((sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1))
+
+    def _triangulated(self, unknowns: FloatArray) -> FloatArray:
+        """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
+        (turns, moves_m, _), (rays, sure) = self._poses(unknowns), self._seen(unknowns)
         ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
         ahead = np.einsum("cji,cmpj->cmpi", turns, ahead)
         ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-        # A point has the least sum of squared distances from its rays.
         across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
         across *= (sure**2)[..., None, None]
-        centres = -np.einsum("cji,cj->ci", turns, films[:, _MOVE])
-        matrix = across.sum(axis=0)
+        centres = -np.einsum("cji,cj->ci", turns, moves_m)
         right = np.einsum("cmpij,cj->mpi", across, centres)
-        loose = matrix + 1e-9 * np.eye(3)
-        places_m = np.linalg.solve(loose, right[..., None])[..., 0]
-        there_m = np.einsum("cij,mpj->cmpi", turns, places_m) + films[:, None, None, _MOVE]
-        return _Points(places_m, there_m, rays, sure, matrix)
+        loose = across.sum(axis=0) + 1e-9 * np.eye(3)
+        return np.linalg.solve(loose, right[..., None])[..., 0]
 
-    def _scale(self, unknowns: FloatArray, one: _Moments) -> tuple[FloatArray, FloatArray]:
-        """Return distances to each film, (c, m, 1, 1), m, and deviations of bones, (m, b), m.
+    def _before(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+        """Return the places in the optical frame of each film, (c, m, 25, 3)."""
+        turns, moves_m, _ = self._poses(unknowns)
+        there: FloatArray = np.einsum("cij,mpj->cmpi", turns, places) + moves_m[:, None, None]
+        return there
 
-        They stay while the unknowns change: otherwise a smaller scene would fit better.
-        """
-        points = self._triangulated(unknowns, one)
-        is_seen = (points.sure > 0.0) & (points.there_m[..., 2] > _NEAREST_M)
-        count, depth_m = is_seen.sum(axis=2), points.there_m[..., 2]
-        far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
-        far_m = np.where(count > 0, far_m, 1.0)
-        # Rays that hardly meet leave the depth of a point open.
-        meets = np.sqrt(np.clip(np.linalg.eigvalsh(points.matrix)[..., 0], 1e-3, 1.0))
-        worst = meets[:, _ENDS].min(axis=-1)
-        return far_m[..., None, None], np.hypot(_BONE, self._point / worst) * one.stature_m
+    def _errors(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+        """Return the errors of rays, then of bones, in deviations, (m, r)."""
+        rays, sure = self._seen(unknowns)
+        there = self._before(unknowns, places)
+        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - rays
+        away *= self._scale * sure[..., None]
+        bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
+        off = np.linalg.norm(bones, axis=-1) - np.exp(unknowns[self._lengths])
+        off *= self._are_whole(sure) / (_BONE * self._moments.stature_m)
+        return np.hstack([away.swapaxes(0, 1).reshape(len(places), -1), off])
 
-    def _errors(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.int64]]:
-        """Return residuals in deviations, weights of losses, and which length each has, or -1."""
-        rows, weights, first = list[FloatArray](), list[FloatArray](), self._fixed.size
-        lengths = list[NDArray[np.int64]]()
-        for one, (far_m, deviation_m) in zip(self._moments, self._scales, strict=True):
-            points = self._triangulated(unknowns, one)
-            seen = points.there_m[..., :2] / np.maximum(points.there_m[..., 2:], _NEAREST_M)
-            away = (seen - points.rays) * far_m / (self._point * one.stature_m)
-            away *= points.sure[..., None]
-            ends_m = points.places_m[:, _ENDS]
-            length_m = np.linalg.norm(ends_m[:, :, 0] - ends_m[:, :, 1], axis=-1)
-            off_m = length_m - np.exp(unknowns[first + _LENGTHS])
-            is_seen = (points.sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1)
-            rows += [away.ravel(), (off_m / deviation_m * is_seen).ravel()]
-            weights.append(np.full(away.size + off_m.size, one.weight))
-            lengths += [np.full(away.size, -1), np.tile(first + _LENGTHS, len(off_m))]
-            first += len(_PRIORS)
-        return np.concatenate(rows), np.concatenate(weights), np.concatenate(lengths)
+    def _linearized(
+        self, unknowns: FloatArray, places: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return the errors (m, r), and their derivatives by the places, (m, r, 75)."""
+        turns, sure = self._poses(unknowns)[0], self._seen(unknowns)[1]
+        there = self._before(unknowns, places)
+        ahead = np.maximum(there[..., 2:], _NEAREST_M)
+        by_there = np.zeros((*there.shape[:-1], 2, 3))
+        by_there[..., :2] = np.eye(2)
+        by_there[..., 2] = -there[..., :2] / ahead
+        by_there *= (self._scale * sure[..., None] / ahead)[..., None]
+        of_rays = np.zeros((len(places), len(turns), len(_NAMES), 2, len(_NAMES), 3))
+        each, bone = np.arange(len(_NAMES)), np.arange(len(_ENDS))
+        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, turns)
+        bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
+        bones /= np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
+        bones *= (self._are_whole(sure) / (_BONE * self._moments.stature_m))[..., None]
+        of_bones = np.zeros((len(places), len(bone), len(_NAMES), 3))
+        of_bones[:, bone, _ENDS[:, 0]], of_bones[:, bone, _ENDS[:, 1]] = bones, -bones
+        shape = len(places), -1, 3 * len(_NAMES)
+        slopes = np.hstack([of_rays.reshape(shape), of_bones.reshape(shape)])
+        return self._errors(unknowns, places), slopes
 
-    def _points(self, values: FloatArray) -> Residuals:
-        """Return residuals of points and bones whose loss is bounded (Geman & McClure, 1985).
 
-        A detector that takes one arm for the other is wrong by any distance.
-        """
-        unknowns = values[0]
-        errors, weights, lengths = self._errors(unknowns)
-        jacobian = np.zeros((len(errors), len(unknowns)))
-        for number in range(self._fixed.size):
-            moved = unknowns.copy()
-            moved[number] += DIFFERENCE
-            jacobian[:, number] = (self._errors(moved)[0] - errors) / DIFFERENCE
-        # Each bone depends on one length alone.
-        moved = unknowns.copy()
-        moved[self._fixed.size :] += DIFFERENCE
-        rows = np.flatnonzero(lengths >= 0)
-        jacobian[rows, lengths[rows]] = (self._errors(moved)[0] - errors)[rows] / DIFFERENCE
-        bounded = 1.0 + (errors / _ROBUST) ** 2
-        costs = np.array([(weights * errors**2 / bounded).sum()])
-        roots = np.sqrt(weights) / bounded
-        return Residuals((roots * errors)[None], (roots[:, None] * jacobian)[None], costs)
+def _bounded(errors: FloatArray, jacobian: FloatArray) -> Residuals:
+    """Return residuals (N, R) with the loss of Geman & McClure; the Jacobian is (N, R, n)."""
+    bounded = 1.0 + (errors / _ROBUST) ** 2
+    return Residuals(
+        errors / bounded, jacobian / bounded[..., None], (errors**2 / bounded).sum(axis=1)
+    )

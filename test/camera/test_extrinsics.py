@@ -88,6 +88,22 @@ def test_a_group_of_aniposelib_may_be_in_millimetres(
     assert_same(load_extrinsics(file, ["a", "b"])["b"], poses[1].after(poses[0].inverse()))
 
 
+@pytest.mark.parametrize("unit", [1.0, 1000.0])
+@pytest.mark.parametrize("ending", ["yml", "xml", "json"])
+def test_what_stereo_calibrate_of_opencv_finds_is_the_pose_of_the_second_camera(
+    tmp_path: Path, rng: np.random.Generator, ending: str, unit: float
+) -> None:
+    pose, file = random_pose(rng), tmp_path / f"stereo.{ending}"
+    storage = cv2.FileStorage(str(file), cv2.FileStorage_WRITE)
+    storage.write("K1", np.eye(3))
+    storage.write("R", pose.rotation)
+    storage.write("T", unit * pose.translation_m[:, None])
+    storage.release()
+    assert_same(load_extrinsics(file, ["a", "b"])["b"], pose)
+    with pytest.raises(CameraError, match=r"R and T.*Kalibr"):
+        load_extrinsics(file, ["a", "b", "c"])
+
+
 MOVED = np.array(matrix(Extrinsics(np.eye(3), np.array([-0.12, 0.0, 0.0]))))
 
 
@@ -108,6 +124,7 @@ def chain_of(step: np.ndarray) -> str:
         ("x.yaml", chain_of(MOVED.T), "transposed"),
         ("x.yaml", chain_of(np.eye(4) * np.nan), "finite"),
         ("x.yaml", "cam0: [", "pars"),
+        ("x.yaml", "R: [1, 2]\nT: [0, 0, 1]\n", "reshape"),
         ("x.yaml", "- 1", "none"),
         ("x.toml", "cam = 1", "none"),
         ("x.toml", '[a]\nname = "cam0"\nrotation = [1]\ntranslation = [0, 0, 0]', "three numbers"),

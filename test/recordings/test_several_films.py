@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.extrinsics import Extrinsics
+from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
 from cardbox_tracker.commands.main import build_parser
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.commands.tracking_request import points_named, tracking_request
@@ -81,10 +81,16 @@ def film(
     seed: int = 1,
     noise_px: float = 0.3,
     seconds: float = 8.0,
+    exchanged_s: tuple[float, float] = (0.0, 0.0),
+    noise_seed: int = 0,
     **given: object,
 ) -> Film:
-    """Return a film, from ``begins_s`` on, of the person with this seed."""
-    times_s, rng = np.arange(0.0, seconds, 1.0 / hz), np.random.default_rng(100 + round(hz))
+    """Return a film, from ``begins_s`` on, of the person with this seed.
+
+    The detector takes left for right in part of the time.
+    """
+    times_s = np.arange(0.0, seconds, 1.0 / hz)
+    rng = np.random.default_rng([*name.encode(), round(hz), noise_seed])
     there_m = skeleton(times_s + begins_s, seed) @ pose.rotation.T + pose.translation_m
     px = CAMERA.project(there_m) + rng.normal(0.0, noise_px, (*there_m.shape[:2], 2))
     sightings = []
@@ -93,7 +99,9 @@ def film(
         found = {
             one: (*uv, 1.0, *xyz) for one, uv, xyz in zip(NAMES, at.tolist(), space, strict=True)
         }
-        sightings.append((float(time_s), ImagePoints.of(found)))
+        points, (begin_s, end_s) = ImagePoints.of(found), exchanged_s
+        is_exchanged = begin_s <= time_s < end_s
+        sightings.append((float(time_s), points.exchanged() if is_exchanged else points))
     return Film(name, [Seen(sightings, CAMERA)], **given)  # type: ignore[arg-type]
 
 
@@ -157,6 +165,54 @@ def test_people_of_two_films_are_found_in_each_other() -> None:
     two = [film("b", true, OFFSET_S, 15.0, seed).people[0] for seed in (2, 1)]
     (found,) = film_cameras([Film("a", one), Film("b", two)], (STATURE_M,))
     check_pose(found, true, degrees=2.0, share=0.05)
+
+
+def test_two_people_show_an_offset_that_neither_shows_alone() -> None:
+    true = other_camera(120.0)
+    given = {"noise_px": 3.0, "seconds": 1.2}
+    one = [film("a", FIRST, 0.0, 30.0, seed, **given).people[0] for seed in (1, 2)]
+    two = [film("b", true, 0.1, 30.0, seed, **given).people[0] for seed in (1, 2)]
+    for ours, theirs in zip(one, two, strict=True):
+        with pytest.raises(CameraError, match="do not show the same people"):
+            film_cameras([Film("a", [ours]), Film("b", [theirs])], (STATURE_M,))
+    (found,) = film_cameras([Film("a", one), Film("b", two)], (STATURE_M,))
+    assert found.offset_s == pytest.approx(0.1, abs=0.5 / 30)
+
+
+def test_a_detector_may_take_left_for_right() -> None:
+    first, true = film("a", FIRST, 0.0, 30.0, noise_px=1.0, seconds=2.0), other_camera(60.0)
+    poses = [
+        film_cameras(
+            [first, film("b", true, 0.1, 30.0, noise_px=1.0, seconds=2.0, exchanged_s=part)],
+            (STATURE_M,),
+        )[0].extrinsics
+        for part in ((0.0, 0.0), (0.3, 1.1))
+    ]
+    angle_rad, away_m = poses[0].difference(poses[1])
+    assert np.degrees(angle_rad) < 0.01
+    assert away_m < 1e-3
+
+
+def test_noise_does_not_draw_cameras_apart() -> None:
+    true, turned_deg = other_camera(25.0), []
+    for seed in range(3):
+        films = [
+            film(name, pose, 0.0, 15.0, noise_px=1.0, seconds=6.0, noise_seed=seed)
+            for name, pose in (("a", FIRST), ("b", true))
+        ]
+        (found,) = film_cameras(films, (STATURE_M,))
+        turned_deg.append(np.degrees(angle_of(found.extrinsics.rotation)))
+    assert np.mean(turned_deg) == pytest.approx(25.0, abs=0.5)
+
+
+def test_the_head_hides_the_face_of_who_looks_away() -> None:
+    away, back = (
+        film("a", other_camera(angle_deg), 0.0, 15.0, seconds=1.0).people[0]
+        for angle_deg in (0.0, 180.0)
+    )
+    nose = NAMES.index("nose")
+    assert (away.sure[:, nose] == 1.0).all()
+    assert (back.sure[:, nose] < 0.5).all()
 
 
 @pytest.mark.parametrize(

@@ -18,8 +18,9 @@ cameras_parameter = partial(
 extrinsics_parameter = partial(
     at_start,
     "",
-    "file with the cameras' poses: a camchain of Kalibr (YAML) or a camera group of aniposelib "
-    "(TOML); not needed for a rectified pair or with /tf_static; empty: none",
+    "file with the cameras' poses: a camchain of Kalibr (YAML), a camera group of aniposelib "
+    "(TOML) or R and T of OpenCV's stereoCalibrate (FileStorage); not needed for a "
+    "rectified pair or with /tf_static; empty: none",
 )
 
 depth_parameter = partial(
