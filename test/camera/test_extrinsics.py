@@ -124,7 +124,7 @@ def chain_of(step: np.ndarray) -> str:
         ("x.yaml", chain_of(MOVED.T), "transposed"),
         ("x.yaml", chain_of(np.eye(4) * np.nan), "finite"),
         ("x.yaml", "cam0: [", "pars"),
-        ("x.yaml", "R: [1, 2]\nT: [0, 0, 1]\n", "reshape"),
+        ("x.yaml", "R: [1, 2]\nT: [0, 0, 1]\n", "of another type, size or range"),
         ("x.yaml", "- 1", "none"),
         ("x.toml", "cam = 1", "none"),
         ("x.toml", '[a]\nname = "cam0"\nrotation = [1]\ntranslation = [0, 0, 0]', "three numbers"),

@@ -90,7 +90,7 @@ def test_another_working_size_is_refused(path: Path) -> None:
         ({"mean": planes(1200, 1600)}, "too much"),
         ({"distortion": np.zeros(1000)}, "too much"),
         ({"distortion_model": np.array("x" * 1000)}, "too much"),
-        ({"k": np.zeros(4)}, "reshape"),
+        ({"k": np.zeros(4)}, "of another type, size or range"),
         ({"size": np.array([320])}, "size is not two whole numbers"),
     ],
 )
