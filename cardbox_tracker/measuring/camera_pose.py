@@ -21,7 +21,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.least_squares import Residuals, geman_mcclure, minimize, rules_of
+from cardbox_tracker.common.least_squares import ENDS, Residuals, geman_mcclure, minimize, rules_of
 from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
@@ -43,8 +43,7 @@ ROTATION = (0, 1, 2)
 WITHOUT_ROLL = (0, 1, 3, 4, 5)
 """All indices of a change except the roll, which outlines hardly constrain."""
 
-# Steps to a pose, and standard deviation of a distance, px.
-_STEPS = 8
+# Standard deviation of a distance, px.
 _POINT_PX = 4.0
 # Standard deviations of the tracked state.
 STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
@@ -126,7 +125,7 @@ class PoseProblem:
         residuals = {"outlines": self._outlines}
         if self._tangents is not None:
             residuals["tangents"] = self._tangent_heights
-        solution = minimize(residuals, self._start[None], rules, _STEPS)
+        solution = minimize(residuals, self._start[None], rules, *ENDS)
         cost = float(solution.costs["outlines"][0]) / max(1, len(self._seen))
         return moved_by(self._extrinsics, solution.values[0, :N_POSE]), cost
 

@@ -57,7 +57,7 @@ TRUE = aside()
 @pytest.fixture
 def one_step(monkeypatch: pytest.MonkeyPatch) -> None:
     """For tests of what does not depend on how exactly the turn of a camera is estimated."""
-    monkeypatch.setattr(camera_pose, "_STEPS", 1)
+    monkeypatch.setattr(camera_pose, "ENDS", (1, 0.0))
 
 
 def sightings(
@@ -250,7 +250,7 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
     # Less of everything than a recording deserves.
     monkeypatch.setattr(camera_calibration, "_PASSES", 1)
     monkeypatch.setattr(camera_calibration, "_SIGHTINGS", 8)
-    monkeypatch.setattr(camera_pose, "_STEPS", 4)
+    monkeypatch.setattr(camera_pose, "ENDS", (4, 0.0))
     monkeypatch.setattr(camera_guess, "_BEST", 2)
     states = reference_states(BODY, "left")
     seen = sightings(list(states.values()))
@@ -267,7 +267,7 @@ def test_extrinsics_are_found_without_a_board(monkeypatch: pytest.MonkeyPatch) -
         assert given == (BODY, CAMERA, OTHER, references, "left")
         return guess
 
-    monkeypatch.setattr(camera_pose, "_STEPS", 2)
+    monkeypatch.setattr(camera_pose, "ENDS", (2, 0.0))
     monkeypatch.setattr(camera_calibration, "guessed_extrinsics", guessed)
     found = calibrated_camera(BODY, (CAMERA, OTHER), references, moving)
     angle_rad, away_m = found.extrinsics.difference(TRUE)
