@@ -325,14 +325,16 @@ def pseudo_huber(
 
 
 def geman_mcclure(
-    errors: Floats, jacobian: Floats, scale: float, deviation: float, weight: float = 1.0
+    errors: Floats, jacobian: Floats, scale: float, deviation: float = 1.0, weight: float = 1.0
 ) -> Residuals:
-    """Return residuals whose loss has a limit, and at ``scale`` a quarter of the weight of squares.
+    """Return residuals whose loss has a limit (Geman & McClure, 1985).
+
+    At ``scale`` they have a quarter of the weight of squares.
 
     Errors (N, R), their Jacobian (N, R, n), ``scale`` and the ``deviation`` have one unit;
     ``weight`` multiplies the loss.
     """
-    share = 1.0 / (1.0 + (errors / scale) ** 2)
-    costs = weight * (share * (errors / deviation) ** 2).sum(axis=1)
-    roots = sqrt(weight) * share / deviation
-    return Residuals(roots * errors, roots[..., None] * jacobian, costs)
+    bounded = 1.0 + (errors / scale) ** 2
+    costs = weight * ((errors / deviation) ** 2 / bounded).sum(axis=1)
+    divisors = deviation / sqrt(weight) * bounded
+    return Residuals(errors / divisors, jacobian / divisors[..., None], costs)

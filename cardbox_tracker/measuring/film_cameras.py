@@ -30,7 +30,14 @@ from scipy.signal import correlate
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.common.least_squares import DIFFERENCE, Residuals, Solution, minimize, rules_of
+from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
+    Residuals,
+    Solution,
+    geman_mcclure,
+    minimize,
+    rules_of,
+)
 from cardbox_tracker.detectors.image_points import (
     LEG_POINT_NAMES,
     POINT_NAMES,
@@ -597,7 +604,7 @@ class _Person:
 
         def of_points(places: FloatArray) -> Residuals:
             errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
-            return _bounded(errors, slopes)
+            return geman_mcclure(errors, slopes, _ROBUST)
 
         begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
         rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
@@ -609,8 +616,8 @@ class _Person:
             moved = unknowns.copy()
             moved[number] += DIFFERENCE
             changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
-        values, slopes, costs = _bounded(errors, slopes)
-        changes = _bounded(errors, changes).jacobian
+        values, slopes, costs = geman_mcclure(errors, slopes, _ROBUST)
+        changes = geman_mcclure(errors, changes, _ROBUST).jacobian
         made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
         jacobian = (changes - slopes @ made_up).reshape(1, -1, len(unknowns))
         root = math.sqrt(self._moments.weight)
@@ -695,11 +702,3 @@ class _Person:
         shape = len(places), -1, 3 * len(_NAMES)
         slopes = np.hstack([of_rays.reshape(shape), of_bones.reshape(shape)])
         return self._errors(unknowns, places), slopes
-
-
-def _bounded(errors: FloatArray, jacobian: FloatArray) -> Residuals:
-    """Return residuals (N, R) with the loss of Geman & McClure; the Jacobian is (N, R, n)."""
-    bounded = 1.0 + (errors / _ROBUST) ** 2
-    return Residuals(
-        errors / bounded, jacobian / bounded[..., None], (errors**2 / bounded).sum(axis=1)
-    )
