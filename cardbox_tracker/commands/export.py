@@ -57,6 +57,12 @@ def run(given: Arguments) -> None:
     chosen = formats()[given.to]
     output = given.output or Path(given.results.resolve().stem + chosen.suffix)
     chosen.check()
+    meant = {one.suffix: name for name, one in formats().items()}
+    if not chosen.suffix.endswith(output.suffix) and output.suffix in meant:
+        raise CardboxError(
+            f"{output.name} has the name of another format; give --to {meant[output.suffix]}, or "
+            f"a name that ends with {chosen.suffix}"
+        )
     model = None if given.model is None else load_body_model(given.model)
     if NUMBER in output.name and given.person is None:
         people = read_people(given.results)

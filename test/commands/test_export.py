@@ -286,6 +286,7 @@ def test_a_body_beside_the_table_that_is_anothers(
         ),
         (("person.csv", "--to", "trc", "--fill", "1"), "--fill needs a low-pass; give --cutoff"),
         (("person.yaml", "--to", "trc"), "has no column"),
+        (("person.csv", "--to", "sto", "--output", "FOLDER/a.mot"), "give --to mot, or a name"),
         (("nothing.csv", "--to", "trc"), "there are no results"),
     ],
 )
@@ -293,7 +294,7 @@ def test_mistakes_of_export(
     words: tuple[str, ...], expected: str, results: Path, tmp_path: Path, cardbox: Callable
 ) -> None:
     rest = [word.replace("FOLDER", str(results)) for word in words[1:]]
-    done = cardbox("export", results / words[0], *rest, "--output", tmp_path / "made")
+    done = cardbox("export", results / words[0], "--output", tmp_path / "made", *rest)
     done.assert_refused("export", expected)
     assert list(tmp_path.iterdir()) == []
 
