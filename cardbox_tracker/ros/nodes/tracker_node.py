@@ -32,6 +32,7 @@ from cardbox_tracker.ros.nodes.tracker_outputs import TrackedBodies, TrackerOutp
 from cardbox_tracker.ros.nodes.tracker_parameters import TrackerParameters
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
+from cardbox_tracker.ros.runtime.diagnostics import every_second
 from cardbox_tracker.ros.runtime.node import CardboxNode
 from cardbox_tracker.ros.runtime.parameters import LiveParameters
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, UNCERTAIN, Estimate
@@ -195,6 +196,9 @@ class TrackerNode(CardboxNode):
         self._others: Sequence[OtherCamera] = ()
         self._session: Session | None = None
         self._smoother = self._new_smoother()
+        self._is_silent = True
+        if settings.lag:
+            every_second(self, self._publish_last)
         self._as_seen: list[Tracker] = []
         self._scene: SceneWatch | None = None
         numbers = [None, *range(1, settings.people + 1)][settings.people > 0 :]
@@ -345,6 +349,7 @@ class TrackerNode(CardboxNode):
             text = "no body model yet: call initializer/initialize"
             self._outputs[0].waiting(lead.message, lead.image, text)
             return
+        self._is_silent = False
         seen = self._inputs.observed(received)
         estimates, trackers = self._session.track(seen.observations), self._session.trackers
         if self.parameters.value.lag:
@@ -360,6 +365,12 @@ class TrackerNode(CardboxNode):
 
     def _new_smoother(self) -> Smoother[Seen]:
         return Smoother(Smoothing(self.parameters.value.lag, every_s=0.0))
+
+    def _publish_last(self) -> None:
+        """Publish what waits for later images if none has come for a second."""
+        if self._is_silent:
+            self._publish(self._smoother.finish())
+        self._is_silent = True
 
     def _publish(self, finished: Iterable[tuple[Seen, Sequence[Estimate]]]) -> None:
         """Publish the results of images."""

@@ -89,10 +89,18 @@ def test_with_a_lag_each_result_comes_later_with_its_own_stamp(bus: Any, node: A
     assert stamps == [*range(16)]
     assert np.abs(places[6:]).max() < 0.004
     assert len(bus.sent["/keypoints"]) == 16
+    # The last ones of a stream that has ended do not wait for ever.
+    bus.tick()
+    assert len(stamps_and_places(bus)[0]) == 16
+    bus.tick()
+    assert stamps_and_places(bus)[0] == [*range(20)]
+    show(bus, range(20, 26))
+    bus.tick()
+    assert stamps_and_places(bus)[0] == [*range(22)]
     # A source that begins again gets what waited, and another beginning.
     show(bus, range(-60, -50))
     stamps, _ = stamps_and_places(bus)
-    assert stamps[16:] == [16, 17, 18, 19, *range(-60, -54)]
+    assert stamps[22:] == [22, 23, 24, 25, *range(-60, -54)]
 
 
 def test_the_paper_s_filter_has_no_lag(bus: Any) -> None:
