@@ -220,15 +220,22 @@ def _add(values: Floats, jacobian: Floats, number: int, found: Equations) -> Non
     """Add residuals (N, R) with a Jacobian (N, R, n) to the equations, and their squares."""
     _, information, right, costs = found
     size = right.shape[1]
+    # Of many unknowns, a residual depends on few.
+    known, count = np.empty(size, np.int64), 0
     for n in range(values.shape[0]):
         for r in range(values.shape[1]):
             costs[n, number] += values[n, r] ** 2
+            count = 0
             for i in range(size):
+                if jacobian[n, r, i] != 0.0:
+                    known[count] = i
+                    count += 1
+            for a in range(count):
+                i = known[a]
                 slope = jacobian[n, r, i]
-                if slope != 0.0:
-                    right[n, i] -= slope * values[n, r]
-                    for j in range(i, size):
-                        information[n, i, j] += slope * jacobian[n, r, j]
+                right[n, i] -= slope * values[n, r]
+                for b in range(a, count):
+                    information[n, i, known[b]] += slope * jacobian[n, r, known[b]]
 
 
 @kernel

@@ -137,7 +137,9 @@ class PoseProblem:
     def _outlines(self, values: FloatArray) -> Residuals:
         """Return the distances of body and silhouette in both cameras."""
         here, *beside = map(self._drawer, self._poses(values))
-        states, errors, slopes = values[0, N_POSE:].reshape(-1, N_STATE), [], []
+        states = values[0, N_POSE:].reshape(-1, N_STATE)
+        ends = np.cumsum([len(one.distances) + len(two.distances) for one, two in self._seen])
+        errors, slopes, costs = np.empty(ends[-1]), np.zeros((ends[-1], values.size)), np.zeros(1)
         for number, (state, (first, other)) in enumerate(zip(states, self._seen, strict=True)):
             steps = np.vstack([np.zeros(N_STATE), np.diag(STATE_STEP), -np.diag(STATE_STEP)])
             moved = [
@@ -145,15 +147,17 @@ class PoseProblem:
                 for one in state + steps
             ]
             there = np.array([other.drawn(drawer(state)) for drawer in beside])
-            slope = np.zeros((len(moved[0]), len(self._start)))
-            slope[len(first.distances) :, :N_POSE] = _slopes(there, _POSE_STEP)
-            own = slice(N_POSE + number * N_STATE, N_POSE + (number + 1) * N_STATE)
-            slope[:, own] = _slopes(np.array(moved[1:]), STATE_STEP)
-            errors.append(moved[0] - np.append(first.distances, other.distances))
-            slopes.append(slope)
-        return geman_mcclure(
-            np.concatenate(errors)[None], np.concatenate(slopes)[None], HALF_PX, _POINT_PX
-        )
+            by_pose = np.zeros((len(moved[0]), N_POSE))
+            by_pose[len(first.distances) :] = _slopes(there, _POSE_STEP)
+            slope = np.hstack([by_pose, _slopes(np.array(moved[1:]), STATE_STEP)])
+            error = moved[0] - np.append(first.distances, other.distances)
+            robust = geman_mcclure(error[None], slope[None], HALF_PX, _POINT_PX)
+            rows, own = slice(ends[number] - len(error), ends[number]), N_POSE + number * N_STATE
+            errors[rows], slopes[rows, :N_POSE] = robust.values[0], robust.jacobian[0, :, :N_POSE]
+            slopes[rows, own : own + N_STATE] = robust.jacobian[0, :, N_POSE:]
+            assert robust.costs is not None
+            costs += robust.costs
+        return Residuals(errors[None], slopes[None], costs)
 
     def _tangent_heights(self, values: FloatArray) -> Residuals:
         assert self._tangents is not None
