@@ -187,7 +187,7 @@ def test_wrong_extrinsics_are_told_and_right_ones_are_not() -> None:
     assert wrong.turned_deg[0] > right.turned_deg[0] + 1.0
 
 
-def test_wrong_sizes_of_a_person_by_stature_are_no_wrong_extrinsics() -> None:
+def test_wrong_sizes_of_a_person_by_stature_are_no_wrong_extrinsics(one_step: None) -> None:
     larger = BODY.with_values(sizes=1.1 * BODY.sizes)
     measured, guessed = larger, larger.with_values(source=PROPORTIONS)
     said = []
