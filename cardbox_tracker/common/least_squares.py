@@ -37,6 +37,8 @@ ENDS = 8, 1e-3
 one."""
 DIFFERENCE = 1e-5
 """Change of an unknown for the derivatives by it."""
+ROBUST = 2.0
+"""Deviations from which on a residual counts less, where nothing else is known of outliers."""
 # Change of the diagonal's factor after a step, and its largest value.
 _FACTOR, _LARGEST_FACTOR = 4.0, 4.0**8
 # Least square of a pivot: what no residual depends on stays.
@@ -318,7 +320,7 @@ def _accept(
 
 
 def pseudo_huber(
-    errors: Floats, jacobian: Floats, scale: float, weight: Floats | float = 1.0
+    errors: Floats, jacobian: Floats, scale: float = ROBUST, weight: Floats | float = 1.0
 ) -> Residuals:
     """Return residuals whose loss is linear far above the ``scale``.
 
@@ -332,7 +334,11 @@ def pseudo_huber(
 
 
 def geman_mcclure(
-    errors: Floats, jacobian: Floats, scale: float, deviation: float = 1.0, weight: float = 1.0
+    errors: Floats,
+    jacobian: Floats,
+    scale: float = ROBUST,
+    deviation: float = 1.0,
+    weight: float = 1.0,
 ) -> Residuals:
     """Return residuals whose loss has a limit (Geman & McClure, 1985).
 

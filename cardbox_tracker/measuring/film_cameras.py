@@ -39,6 +39,7 @@ from cardbox_tracker.common.least_squares import (
     rules_of,
 )
 from cardbox_tracker.detectors.image_points import (
+    CERTAIN,
     LEG_POINT_NAMES,
     POINT_NAMES,
     ImagePoints,
@@ -72,7 +73,6 @@ _LIMBS = {
 }
 _BREADTHS = {"shoulder": (0.197, 0.10), "hip": (0.12, 0.15)}
 _PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
-_LEAST_SCORE = 0.5
 # Speeds are of points smoothed over this time, s, and count to this many deviations.
 _SMOOTH_S, _MOST_SPEED = 0.07, 3.0
 # Movements of arms, legs and trunk that are independent.
@@ -85,14 +85,12 @@ _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
 # Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
 # on the far side of the body, which it hides, are this many times less sure.
 _COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
-# Residual from which on it counts less, deviations.
-_ROBUST = 2.0
 _FACE, _EARS = slice(0, 3), slice(3, 5)
 # How much further than its partner of the other side a joint is if the body hides it, m.
 _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
-_ROUNDS, _LEAST_GAIN, _NEAREST_M = 25, 1e-5, 0.05
+_FIT_ENDS, _NEAREST_M = (25, 1e-5), 0.05
 # Steps to the points of an image, and the inverse variance, 1/m^2, that keeps those not seen.
 _INNER, _LOOSE = 4, 1e-6
 _OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
@@ -116,7 +114,7 @@ class Seen:
         rows = [_all_points(points) for _, points in sightings]
         px, scores, self.spatial_m = (np.array(one) for one in zip(*rows, strict=True))
         self.times_s = np.array([time_s for time_s, _ in sightings])
-        known = (scores >= _LEAST_SCORE) & is_inside(px, camera)
+        known = (scores >= CERTAIN) & is_inside(px, camera)
         self.rays = np.where(known[..., None], camera.rays(px)[..., :2], 0.0)
         is_exchanged = _are_exchanged(self.rays, known)
         for values in (self.rays, known, self.spatial_m):
@@ -549,7 +547,7 @@ class _Fit:
         at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
         low[at], high[at] = self._offsets_s
         rules = rules_of(len(mean), mean=mean, inverse=inverse, low=low, high=high)
-        found = minimize({"points": self._residuals}, values[None], rules, _ROUNDS, _LEAST_GAIN)
+        found = minimize({"points": self._residuals}, values[None], rules, *_FIT_ENDS)
         return found.values[0], found
 
     def count(self, unknowns: FloatArray) -> float:
@@ -604,7 +602,7 @@ class _Person:
 
         def of_points(places: FloatArray) -> Residuals:
             errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
-            return geman_mcclure(errors, slopes, _ROBUST)
+            return geman_mcclure(errors, slopes)
 
         begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
         rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
@@ -616,8 +614,8 @@ class _Person:
             moved = unknowns.copy()
             moved[number] += DIFFERENCE
             changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
-        values, slopes, costs = geman_mcclure(errors, slopes, _ROBUST)
-        changes = geman_mcclure(errors, changes, _ROBUST).jacobian
+        values, slopes, costs = geman_mcclure(errors, slopes)
+        changes = geman_mcclure(errors, changes).jacobian
         made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
         jacobian = (changes - slopes @ made_up).reshape(1, -1, len(unknowns))
         root = math.sqrt(self._moments.weight)

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
     Residuals,
     Rules,
     Solution,
@@ -31,7 +32,12 @@ from cardbox_tracker.common.least_squares import (
     pseudo_huber,
     rules_of,
 )
-from cardbox_tracker.detectors.image_points import LEG_POINT_NAMES, POINT_INDEX, ImagePoints
+from cardbox_tracker.detectors.image_points import (
+    CERTAIN,
+    LEG_POINT_NAMES,
+    POINT_INDEX,
+    ImagePoints,
+)
 from cardbox_tracker.person.proportions import MARKED_HEIGHTS, USUAL_STATURE_M, USUAL_STDDEV_M
 from cardbox_tracker.person.sizes import FloatArray
 
@@ -74,14 +80,13 @@ _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
 # sits, rad. Somebody who is seen from above seems to lean, but not against the own legs: there, the
 # trunk of who stands leans less than the last value.
 _BOWED, _BENT, _SITS, _LEANS_FORWARD = np.radians((50.0, 35.0, 35.0, 20.0))
-_LEAST_SCORE, _LEAST_LEVELS, _BORDER = 0.5, 3, 0.02
+_LEAST_LEVELS, _BORDER = 3, 0.02
 # How far people go in a second before they are first seen upright, m.
 _GOES_M = 0.1
 # Images of one person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
-# Residual from which on it counts less, deviations; steps of the fit, the step of the differences,
-# and the share of the cost that the last step gains.
-_ROBUST, _ROUNDS, _STEP, _LEAST_GAIN = 2.0, 60, 1e-5, 1e-9
+# Steps of the fit, and the share of the cost that the last one gains.
+_ENDS = 60, 1e-9
 # Nearest and farthest logarithm of a distance, statures.
 _NEAREST, _FARTHEST = np.log((0.3, 30.0))
 _SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
@@ -256,18 +261,18 @@ def _fitted(
     """
     scale = distance[:, None, None] / seen.stddevs
     images, weight = np.arange(len(own))[:, None, None], np.repeat(seen.weight, 2 * len(LEVELS))
-    steps = _STEP * np.eye(own.shape[1] + 1, own.shape[1], -1)[:, None]
+    steps = DIFFERENCE * np.eye(own.shape[1] + 1, own.shape[1], -1)[:, None]
 
     def levels(unknowns: FloatArray) -> Residuals:
         moved = (_rays(seen, unknowns[0, own] + steps) - seen.rays) * scale
         away = moved.reshape(*moved.shape[:2], -1)
         jacobian = np.zeros((*away.shape[1:], unknowns.size))
         rows = np.arange(away.shape[2])[:, None]
-        jacobian[images, rows, own[:, None]] = np.moveaxis(away[1:] - away[0], 0, 2) / _STEP
+        jacobian[images, rows, own[:, None]] = np.moveaxis(away[1:] - away[0], 0, 2) / DIFFERENCE
         jacobian = jacobian.reshape(1, -1, unknowns.size)
-        return pseudo_huber(away[0].reshape(1, -1), jacobian, _ROBUST, weight)
+        return pseudo_huber(away[0].reshape(1, -1), jacobian, weight=weight)
 
-    return minimize({"levels": levels}, start[None], rules, _ROUNDS, _LEAST_GAIN)
+    return minimize({"levels": levels}, start[None], rules, *_ENDS)
 
 
 def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
@@ -366,7 +371,7 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
         else:
             at = [POINT_INDEX[name] for name in names]
             there, scores = points.px[at], points.scores[at]
-        if scores.min() >= _LEAST_SCORE and np.isfinite(there).all():
+        if scores.min() >= CERTAIN and np.isfinite(there).all():
             px[number], known[number] = there.mean(axis=0), True
     return px, known
 
