@@ -65,17 +65,24 @@ _X_STEP_M = 0.06
 _PRIOR = 0.003
 
 
-def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
+def upper_body(
+    silhouette: Silhouette, is_detected: bool = False, covered: Silhouette | None = None
+) -> Silhouette | None:
     """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
     It is None if the head is cut off, or a side of the image cuts the trunk, as of somebody who
     comes in, or the region is too large or too small; whom a detector finds may be smaller, and cut
-    by a side.
+    by a side. Nobody may be cut by a side of ``covered`` pixels (H, W), where the camera did not
+    look: models have no side there.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
     least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
-    cut_px = max(np.count_nonzero(seen[:, 0]), np.count_nonzero(seen[:, -1]))
+    cut = seen[:, [0, -1]]
+    if covered is not None:
+        before, after = seen[:, 1:] & covered[:, :-1], seen[:, :-1] & covered[:, 1:]
+        cut, is_detected = np.column_stack([before.any(axis=1), after.any(axis=1)]), False
+    cut_px = np.count_nonzero(cut, axis=0).max()
     is_half = not is_detected and cut_px > _CUT * np.count_nonzero(seen.any(axis=1))
     if is_half or not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
         return None
