@@ -176,13 +176,13 @@ class _Search:
         x_m, z_m = postures[0, PLACE].tolist()
         place, unknown = body.placement, body.unknown
         # Doubt and presence compare with the front posture there, which has to be in the image.
-        columns_px = min(self._camera.cx, self._camera.width - 1 - self._camera.cx)
-        most_m = place.distance_m * columns_px / self._camera.fx - body.size("shoulder_breadth")
-        most_m = max(most_m, 0.0)
+        sides_px = np.array([-self._camera.cx, self._camera.width - 1 - self._camera.cx])
+        room_m = place.distance_m * np.abs(sides_px) / self._camera.fx
+        most_m = np.sign(sides_px) * np.maximum(room_m - body.size("shoulder_breadth"), 0.0)
         body = body.with_values(
             distance_m=place.distance_m - (x_m if "distance_m" in unknown else 0.0),
             hip_height_m=place.hip_height_m + (z_m if "hip_height_m" in unknown else 0.0),
-            lateral_m=float(np.clip(postures[0, TORSO_Y], -most_m, most_m)),
+            lateral_m=float(np.clip(postures[0, TORSO_Y], *most_m)),
         )
         return body, postures[0, POSTURE], iou
 
