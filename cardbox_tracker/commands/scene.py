@@ -251,6 +251,7 @@ def _bodies(
     far = _longest(found) if person.people is None else None
     for body in bodies:
         body = in_scene(body, found.camera, far, person.stature_m or USUAL_STATURE_M)
+        body = body.with_values(camera_moves=found.moves)
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
         yield body
