@@ -78,15 +78,21 @@ def upper_body(
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
     least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
-    cut = seen[:, [0, -1]]
-    if covered is not None:
-        before, after = seen[:, 1:] & covered[:, :-1], seen[:, :-1] & covered[:, 1:]
-        cut, is_detected = np.column_stack([before.any(axis=1), after.any(axis=1)]), False
-    cut_px = np.count_nonzero(cut, axis=0).max()
-    is_half = not is_detected and cut_px > _CUT * np.count_nonzero(seen.any(axis=1))
+    may_be_cut = is_detected and covered is None
+    is_half = not may_be_cut and is_cut(seen, covered)
     if is_half or not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
         return None
     return seen
+
+
+def is_cut(seen: Silhouette, covered: Silhouette | None = None) -> bool:
+    """Return whether a side of the image, or of ``covered`` pixels (H, W), cuts a trunk (H, W)."""
+    sides = seen[:, [0, -1]]
+    if covered is not None:
+        before, after = seen[:, 1:] & covered[:, :-1], seen[:, :-1] & covered[:, 1:]
+        sides = np.column_stack([before.any(axis=1), after.any(axis=1)])
+    rows = np.count_nonzero(seen.any(axis=1))
+    return bool(np.count_nonzero(sides, axis=0).max() > _CUT * rows)
 
 
 @dataclass(frozen=True)
