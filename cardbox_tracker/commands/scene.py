@@ -13,7 +13,7 @@ from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
-from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH
+from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH, Distances
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
     Background,
@@ -105,9 +105,7 @@ def measured_scene(
             given = config, 0, seed, *span
             bodies = seen_people(source, bodies, *given, only=chosen.number)
         elif person.people is None:
-            shown = [one for one in found.distances if one is not None]
-            # One person whom the detector lost is several; the longest is surely who is tracked.
-            longest = max(shown, key=lambda one: len(one.times_s), default=None)
+            longest = _longest(found)
             stature_m = person.stature_m or USUAL_STATURE_M
             far = longest and longest._replace(distances=longest.distances * stature_m)
             bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
@@ -250,12 +248,19 @@ def _bodies(
     bodies: Sequence[BodyModel], person: PersonRequest, found: FoundCamera
 ) -> Iterator[BodyModel]:
     """Yield the bodies with what was found of the camera and of the first person's distance."""
-    far = found.distances[0] if found.distances and person.people is None else None
+    far = _longest(found) if person.people is None else None
     for body in bodies:
         body = in_scene(body, found.camera, far, person.stature_m or USUAL_STATURE_M)
+        body = body.with_values(camera_moves=found.moves)
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
         yield body
+
+
+def _longest(found: FoundCamera) -> Distances | None:
+    """Return the distances of who is tracked: one whom the detector lost is several people."""
+    shown = [one for one in found.distances if one is not None]
+    return max(shown, key=lambda one: len(one.times_s), default=None)
 
 
 def _corrected(recording: RecordingRequest, found: SceneCamera) -> RecordingRequest:

@@ -123,9 +123,9 @@ class _Map:
         inside = np.zeros_like(free)
         inside[border:-border, border:-border] = free[border:-border, border:-border]
         grey = brightness_of(image)
-        blurred = [_blurred(grey, free, blur * self._side) for blur in _BLURS]
+        levels = [blurred(grey, free, blur * self._side) for blur in _BLURS]
         is_first = self.pixels is self._seen
-        back: FloatArray | None = self._back if is_first else self._placed(blurred, inside)
+        back: FloatArray | None = self._back if is_first else self._placed(levels, inside)
         box = None if back is None else self._box(back)
         if back is None or box is None:
             return None
@@ -134,13 +134,13 @@ class _Map:
         self.shown = int(begin[0]), int(begin[1]), int(end[0]), int(end[1])
         # Without a person, nobody was found, who may be there nevertheless.
         if is_first or silhouette.any():
-            self._continue(image, blurred, free, inside, box)
+            self._continue(image, levels, free, inside, box)
         return np.asarray(back.T)
 
     def _continue(
         self,
         image: Image,
-        blurred: Sequence[FloatArray],
+        levels: Sequence[FloatArray],
         free: NDArray[np.bool_],
         inside: NDArray[np.bool_],
         box: Box,
@@ -154,7 +154,7 @@ class _Map:
         window, size = (slice(top, bottom), slice(left, right)), (right - left, bottom - top)
         back = cv2.WARP_INVERSE_MAP | cv2.INTER_NEAREST
         known = cv2.warpPerspective(self._seen[window], matrix, free.shape[::-1], flags=back)
-        slope = np.hypot(*_slopes(blurred[-1]))
+        slope = np.hypot(*_slopes(levels[-1]))
         is_new = inside & (np.asarray(known) < _SOUGHT)
         rows, columns = np.nonzero(is_new & (slope > _SLOPE))
         some = slice(None, None, max(1, round(_FOR_ONE * len(rows) / max(1, is_new.sum()))))
@@ -162,7 +162,7 @@ class _Map:
         rays = self._camera.rays(np.column_stack([columns, rows])) @ self._back.T
         self._rays = np.concatenate([self._rays, rays])
         self._slopes = np.concatenate([self._slopes, slope[rows, columns]])
-        added = np.array([level[rows, columns] for level in blurred])
+        added = np.array([level[rows, columns] for level in levels])
         self._values = np.concatenate([self._values, added], axis=1)
         shown, sought = (
             np.asarray(cv2.warpPerspective(255 * one.astype(np.uint8), matrix, size) == 255)
@@ -173,14 +173,12 @@ class _Map:
         self._seen[window][sought] = _SOUGHT
         self.pixels[window][fill] = np.asarray(cv2.warpPerspective(image, matrix, size))[fill]
 
-    def _placed(
-        self, blurred: Sequence[FloatArray], inside: NDArray[np.bool_]
-    ) -> FloatArray | None:
+    def _placed(self, levels: Sequence[FloatArray], inside: NDArray[np.bool_]) -> FloatArray | None:
         """Return the rotation from an image into the first one."""
         camera, back = self._camera, self._back
         gain, bias = 1.0, 0.0
         near_px, last = _AGREES * self._side, (camera.width - 1, camera.height - 1)
-        for level, values in zip(blurred, self._values, strict=True):
+        for level, values in zip(levels, self._values, strict=True):
             layers = np.dstack([level, *_slopes(level), inside]).astype(np.float32)
             for _ in range(_STEPS):
                 local = self._rays @ back
@@ -234,7 +232,7 @@ class _Map:
         return int(left), int(top), int(right), int(bottom)
 
 
-def _blurred(grey: Image, free: NDArray[np.bool_], stddev_px: float) -> FloatArray:
+def blurred(grey: Image, free: NDArray[np.bool_], stddev_px: float) -> FloatArray:
     """Return an image (H, W) that is blurred by what is free alone."""
     weight = cv2.GaussianBlur(free.astype(np.float32), None, stddev_px)  # type: ignore[call-overload]
     kept = cv2.GaussianBlur(np.where(free, grey, 0).astype(np.float32), None, stddev_px)  # type: ignore[call-overload]

@@ -65,21 +65,34 @@ _X_STEP_M = 0.06
 _PRIOR = 0.003
 
 
-def upper_body(silhouette: Silhouette, is_detected: bool = False) -> Silhouette | None:
+def upper_body(
+    silhouette: Silhouette, is_detected: bool = False, covered: Silhouette | None = None
+) -> Silhouette | None:
     """Return the person of a silhouette (H, W), 0 or 255, which is its largest region, or None.
 
     It is None if the head is cut off, or a side of the image cuts the trunk, as of somebody who
     comes in, or the region is too large or too small; whom a detector finds may be smaller, and cut
-    by a side.
+    by a side. Nobody may be cut by a side of ``covered`` pixels (H, W), where the camera did not
+    look: models have no side there.
     """
     seen = filled(silhouette)
     share = np.count_nonzero(seen) / seen.size
     least = _LEAST_DETECTED if is_detected else MIN_PERSON_FRACTION
-    cut_px = max(np.count_nonzero(seen[:, 0]), np.count_nonzero(seen[:, -1]))
-    is_half = not is_detected and cut_px > _CUT * np.count_nonzero(seen.any(axis=1))
+    may_be_cut = is_detected and covered is None
+    is_half = not may_be_cut and is_cut(seen, covered)
     if is_half or not least <= share <= MAX_PERSON_FRACTION or seen[0].any():
         return None
     return seen
+
+
+def is_cut(seen: Silhouette, covered: Silhouette | None = None) -> bool:
+    """Return whether a side of the image, or of ``covered`` pixels (H, W), cuts a trunk (H, W)."""
+    sides = seen[:, [0, -1]]
+    if covered is not None:
+        before, after = seen[:, 1:] & covered[:, :-1], seen[:, :-1] & covered[:, 1:]
+        sides = np.column_stack([before.any(axis=1), after.any(axis=1)])
+    rows = np.count_nonzero(seen.any(axis=1))
+    return bool(np.count_nonzero(sides, axis=0).max() > _CUT * rows)
 
 
 @dataclass(frozen=True)
@@ -169,13 +182,13 @@ class _Search:
         x_m, z_m = postures[0, PLACE].tolist()
         place, unknown = body.placement, body.unknown
         # Doubt and presence compare with the front posture there, which has to be in the image.
-        columns_px = min(self._camera.cx, self._camera.width - 1 - self._camera.cx)
-        most_m = place.distance_m * columns_px / self._camera.fx - body.size("shoulder_breadth")
-        most_m = max(most_m, 0.0)
+        sides_px = np.array([-self._camera.cx, self._camera.width - 1 - self._camera.cx])
+        room_m = place.distance_m * np.abs(sides_px) / self._camera.fx
+        most_m = np.sign(sides_px) * np.maximum(room_m - body.size("shoulder_breadth"), 0.0)
         body = body.with_values(
             distance_m=place.distance_m - (x_m if "distance_m" in unknown else 0.0),
             hip_height_m=place.hip_height_m + (z_m if "hip_height_m" in unknown else 0.0),
-            lateral_m=float(np.clip(postures[0, TORSO_Y], -most_m, most_m)),
+            lateral_m=float(np.clip(postures[0, TORSO_Y], *most_m)),
         )
         return body, postures[0, POSTURE], iou
 

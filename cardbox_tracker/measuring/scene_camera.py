@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.camera_turns import blurred
 from cardbox_tracker.measuring.people_camera import (
     DISTANCE_STDDEV,
     PITCH_PRIOR,
@@ -63,6 +64,11 @@ _TOLD = np.radians(4.0)
 # A shift of most of the background between two images that shows that the camera moves, as a share
 # of the longer side; pairs of images with such a shift, and points that show it.
 _SHIFT, _SHIFTED_PAIRS, _LEAST_POINTS = 0.01, 0.25, 12
+# Longer side of images whose textures are compared, deviations of the blurs between which texture
+# is, px, and the grey values beyond which it is an edge; share of an image that both show.
+_TEXTURE_PX, _TEXTURE_STDDEVS_PX, _MOST_GREY, _SHARED = 320, (1.5, 6.0), 6.0, 0.2
+# Half of the width of the peak of their correlation, px, which is this much higher than all others.
+_PEAK_PX, _CLEARER = 8, 1.2
 # Deviation of the pitch of a camera that moves, rad, with which nothing is sure; margin around
 # people, share of their height.
 _MOVING, _AROUND = np.radians(12.0), 0.15
@@ -78,12 +84,14 @@ class FoundCamera(NamedTuple):
         sources: what the pitch is found from, in words.
         remarks: sources that contradict each other, and a camera that moves, in words.
         distances: of each person; None where they are not known.
+        moves: whether the camera moves.
     """
 
     camera: SceneCamera
     sources: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
     distances: tuple[Distances | None, ...] = ()
+    moves: bool = False
 
 
 class Background(NamedTuple):
@@ -226,7 +234,7 @@ def scene_camera(
             stature_m = statures_m[0] or USUAL_STATURE_M
             remarks += _contradiction(camera, distances[0], stature_m, given_m)
     camera_found = SceneCamera(lens, found, turned, height)
-    return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances)
+    return FoundCamera(camera_found, tuple(sources), tuple(remarks), distances, bool(moves))
 
 
 def other_lens(
@@ -294,6 +302,10 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
             if abs(seen_s - time_s) < 0.5:
                 _cover(free, points, camera)
         shift = background_shift(before, after, free)
+        if not shift:
+            # Before a bare wall, points of noise were found, or none.
+            by_texture = _texture_shift(before, after, free)
+            shift = shift if by_texture is None else by_texture
         if shift is not None:
             pairs += 1
             shifted += shift > _SHIFT
@@ -327,6 +339,41 @@ def background_shift(
     spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
     length = float(np.linalg.norm(shift))
     return length / max(width, height) if length > 2 * spread else 0.0
+
+
+def _texture_shift(
+    before: NDArray[np.uint8], after: NDArray[np.uint8], free: NDArray[np.uint8]
+) -> float | None:
+    """Return :func:`background_shift` by all pixels, for walls without points that are found again.
+
+    It is where the textures of both images correlate most (D. Padfield, "Masked object registration
+    in the Fourier domain", 2012); None if they correlate nearly as much elsewhere.
+    """
+    scale, rough = _TEXTURE_PX / max(free.shape), cv2.INTER_NEAREST
+    mask = np.asarray(cv2.resize(free, None, fx=scale, fy=scale, interpolation=rough)) > 0
+    size = 2 * mask.shape[0], 2 * mask.shape[1]
+
+    def texture(image: NDArray[np.uint8]) -> FloatArray:
+        small = cv2.resize(brightness_of(image), mask.shape[::-1], interpolation=cv2.INTER_AREA)
+        fine, coarse = (blurred(np.asarray(small), mask, stddev) for stddev in _TEXTURE_STDDEVS_PX)
+        return np.where(mask, np.clip(fine - coarse, -_MOST_GREY, _MOST_GREY), 0.0)
+
+    def products(one: FloatArray, other: FloatArray) -> FloatArray:
+        spectra = np.fft.rfft2(one, size), np.conj(np.fft.rfft2(other, size))
+        return np.fft.irfft2(spectra[0] * spectra[1], size)
+
+    first, last, inside = texture(before), texture(after), mask.astype(np.float64)
+    shared = products(inside, inside)
+    power = products(last**2, inside) * products(inside, first**2)
+    alike = products(last, first) * np.sqrt(np.maximum(shared, 0.0) / np.maximum(power, 1e-9))
+    alike[shared < _SHARED * mask.size] = 0.0
+    peak = np.unravel_index(np.argmax(alike), size)
+    beside = np.roll(alike, np.subtract(_PEAK_PX, peak), axis=(0, 1))
+    beside[: 2 * _PEAK_PX + 1, : 2 * _PEAK_PX + 1] = 0.0
+    if alike[peak] <= _CLEARER * beside.max():
+        return None
+    shift = (np.array(peak) + mask.shape) % size - mask.shape
+    return float(np.linalg.norm(shift)) / _TEXTURE_PX
 
 
 def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None:

@@ -152,6 +152,9 @@ class CameraPose:
     height_stddev_m: float = 0.1  #: its standard deviation, metres; it is no part of a model file
     #: what contradicts the pose, in words, so that no result is sure; it is no part of a model file
     contradiction: str = ""
+    moves: bool = (
+        False  #: whether it moves, so that no place is sure; it is no part of a model file
+    )
 
     def __post_init__(self) -> None:
         """Check the values."""
@@ -231,8 +234,8 @@ class BodyModel:
     def with_values(self, **values: Any) -> BodyModel:
         """Return the same model with other numbers.
 
-        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT``, ``height_stddev_m`` and
-        ``camera_contradiction``. Raises BodyModelError for one out of range.
+        ``values`` are those of :meth:`of`, ``sizes``, ``CAMERA_HEIGHT``, ``height_stddev_m``,
+        ``camera_contradiction`` and ``camera_moves``. Raises BodyModelError for one out of range.
         """
         changed: dict[str, Any] = {}
         if "sizes" in values:
@@ -244,6 +247,7 @@ class BodyModel:
             CAMERA_HEIGHT: "height_m",
             "height_stddev_m": "height_stddev_m",
             "camera_contradiction": "contradiction",
+            "camera_moves": "moves",
         }
         tilted = {tilt[name]: values.pop(name) for name in tilt if name in values}
         place = {name: values.pop(name) for name in PLACEMENT if name in values}

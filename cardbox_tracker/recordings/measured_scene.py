@@ -143,7 +143,7 @@ def turns_in(
 
 
 def _whole(frame: RecordedFrame) -> RecordedFrame | None:
-    seen = upper_body(frame.silhouette, _is_detected(frame))
+    seen = upper_body(frame.silhouette, _is_detected(frame), frame.covered)
     return None if seen is None else frame._replace(recorded=None)
 
 

@@ -16,7 +16,8 @@ or a further camera.
 One outline without points may be that of somebody who has turned aside, or of somebody who stands
 farther away with other arms. The wrong one fits worse, and an outline from aside lacks the breadth
 of the shoulders. So what has changed of the distance since an outline from the front or from behind
-fitted as usual is a deviation, too.
+fitted as usual is a deviation, too. Where a side of the image cuts the trunk, an outline does not
+show its breadth, so no place is sure.
 """
 
 from __future__ import annotations
@@ -32,6 +33,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePoints
+from cardbox_tracker.measuring.first_sight import is_cut
 from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
@@ -173,6 +175,8 @@ class PlaceWatch:
         contradiction = self.contradiction
         if "distance_m" in body.unknown and rests_on == STATURE:
             contradiction = contradiction or "no image has shown the distance yet"
+        if rests_on == self._scale and frame["points"] is None and is_cut(frame.silhouette):
+            contradiction = contradiction or "a side of the image cuts the person"
         return Place(stddev_m, chance, rests_on, contradiction)
 
     def _changed_m(self, estimate: Estimate, frame: Frame, distance_m: float) -> float:

@@ -279,7 +279,8 @@ class Tracker:
 
     def _doubted(self, estimate: Estimate, reason: str) -> Estimate:
         """Return an estimate that is no surer than body, distance, person and limits."""
-        place, wrong = estimate.place, self.body.camera_pose.contradiction
+        place, camera = estimate.place, self.body.camera_pose
+        wrong = camera.contradiction or "the camera moves" * camera.moves
         if self.faults.is_contradicted:
             wrong = wrong or reason
         if place is not None and wrong:
@@ -287,7 +288,7 @@ class Tracker:
             estimate = replace(estimate, place=place)
         if estimate.posture is None:
             return estimate
-        reason = reason or self.body.camera_pose.contradiction
+        reason = reason or camera.contradiction
         if self.place.is_too_large:
             reason = "the body is too large for the distance"
         if self._is_alone and self.cameras[0].identity.is_doubtful:
@@ -306,7 +307,7 @@ class Tracker:
             state=state,
             reason=(reason or estimate.reason) if state == UNCERTAIN else "",
             keypoint_states=states,
-            pitch_stddev_rad=self.body.camera_pose.pitch_stddev_rad,
+            pitch_stddev_rad=camera.pitch_stddev_rad,
         )
 
     def _count(self, frames: Sequence[Frame], estimate: Estimate) -> None:

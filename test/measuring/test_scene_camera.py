@@ -18,7 +18,13 @@ from cardbox_tracker.detectors.image_points import (
 )
 from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS, people_camera
 from cardbox_tracker.measuring.scene import SceneCamera, Value
-from cardbox_tracker.measuring.scene_camera import FoundCamera, lens_of, other_lens, scene_camera
+from cardbox_tracker.measuring.scene_camera import (
+    FoundCamera,
+    background_shift,
+    lens_of,
+    other_lens,
+    scene_camera,
+)
 from cardbox_tracker.person.proportions import MARKED_HEIGHTS
 
 CAMERA = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
@@ -229,6 +235,20 @@ def test_a_camera_that_moves_is_told() -> None:
         pictures = [(10.0 * k, np.roll(room, shift_px * k, axis=1)) for k in range(4)]
         shown = scene_camera(people, pictures, CAMERA, [STATURE_M])
         assert any("camera does not stand still" in one for one in shown.remarks) is moves
+        assert shown.moves is moves
+
+
+def test_a_pan_before_a_wall_without_corners_is_told() -> None:
+    people, rng = [film(WALK, 8.0)], np.random.default_rng(2)
+    rough = cv2.resize(rng.normal(0, 3, (120, 160)), (640, 480), interpolation=cv2.INTER_CUBIC)
+    for shift_px, moves in ((0, False), (40, True)):
+        rolled = [np.roll(rough, shift_px * k, axis=1) for k in range(4)]
+        # The corners are those of the noise.
+        noisy = [128 + one + rng.normal(0, 4, rough.shape) for one in rolled]
+        pictures = [(10.0 * k, one.astype(np.uint8)) for k, one in enumerate(noisy)]
+        free = np.full(rough.shape, 255, np.uint8)
+        assert not background_shift(pictures[0][1], pictures[1][1], free)
+        assert scene_camera(people, pictures, CAMERA, [STATURE_M]).moves is moves
 
 
 @pytest.mark.parametrize("places", [STAND, WALK], ids=["stands", "walks"])

@@ -277,6 +277,21 @@ def test_a_detected_person_may_be_small() -> None:
     assert first_sight.upper_body(far, is_detected=True) is not None
 
 
+def test_nobody_is_measured_where_the_camera_did_not_look_at_half_of_the_trunk() -> None:
+    seen = silhouette(person(1.75, -0.62))
+    columns = np.flatnonzero(seen.any(axis=0))
+    middle, border = int(columns.mean()), int(columns[0]) - 10
+    for end, is_whole in ((middle, False), (border, True)):
+        covered = np.zeros_like(seen)
+        covered[:, :end] = 255
+        left = np.where(covered > 0, np.uint8(0), seen)
+        for view in (slice(None), slice(None, None, -1)):
+            turned = np.ascontiguousarray(left[:, view]), covered[:, view]
+            found = first_sight.upper_body(turned[0], True, turned[1])
+            assert (found is not None) == is_whole
+            assert first_sight.upper_body(turned[0], is_detected=True) is not None
+
+
 def test_the_same_seed_gives_the_same_body() -> None:
     seen = silhouette(person(1.75, -0.62))
     bodies = []

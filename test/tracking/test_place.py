@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
@@ -31,6 +32,8 @@ from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
 TALL = body_from_proportions(1.80, 2.0)
+MEASURED_BODY_AT_2_M = BodyModel.of(distance_m=2.0, hip_height_m=-0.6)
+FRONT = reference_posture("front")
 ARM_M = TALL.size("upper_arm_length") + TALL.size("forearm_length")
 
 
@@ -84,6 +87,7 @@ def estimate_at(distance_m: float, body: BodyModel) -> Estimate:
 
 def frames(points: ImagePoints | None, depth: bool = False, count: int = 10) -> list[Frame]:
     channels = {"points": points, "depth_m": np.ones((240, 320)) if depth else None}
+    channels |= {"silhouette": np.zeros((240, 320), np.uint8)}
     return [Frame(CAMERA, channels, 240, 5000, stamp_ns=number * 10**8) for number in range(count)]
 
 
@@ -106,6 +110,35 @@ def test_the_deviation_of_the_distance_is_that_of_what_it_rests_on(
     assert place is not None
     assert place.rests_on == rests_on
     assert place.stddev_m[0] == pytest.approx(4.0 * np.hypot(relative, 0.005))
+
+
+def test_a_place_is_uncertain_while_a_side_of_the_image_cuts_an_outline() -> None:
+    silhouette = np.zeros((240, 320), np.uint8)
+    for first, points, depth, state in (
+        (0, None, False, KeypointState.UNCERTAIN),
+        (280, None, False, KeypointState.UNCERTAIN),
+        (140, None, False, KeypointState.TRACKED),
+        (0, points_at(2.0), False, KeypointState.TRACKED),
+        (0, None, True, KeypointState.TRACKED),
+    ):
+        seen = silhouette.copy()
+        seen[60:200, first : first + 40] = 255
+        (frame,) = frames(points, depth, count=1)
+        frame = replace(frame, channels={**frame.channels, "silhouette": seen})
+        place = PlaceWatch(TALL, CAMERA).see(estimate_at(1.5, TALL), TALL, frame)
+        assert place is not None and place.state is state
+
+
+def test_no_place_is_sure_before_a_camera_that_moves_and_the_shape_stays() -> None:
+    silhouette = Renderer(CAMERA, np.random.default_rng(0)).silhouette(MEASURED_BODY_AT_2_M, FRONT)
+    shapes = []
+    for moves, state in ((False, KeypointState.TRACKED), (True, KeypointState.UNCERTAIN)):
+        body = MEASURED_BODY_AT_2_M.with_values(camera_moves=moves)
+        tracker = Tracker(body, CAMERA, default_preset(), np.random.default_rng(0))
+        found = tracker.track(silhouette)
+        assert found.place is not None and found.place.state is state
+        shapes.append((found.state, found.reason, found.keypoint_states))
+    assert shapes[0] == shapes[1]
 
 
 def test_an_unsure_pitch_makes_the_distance_unsure_unless_depth_shows_it() -> None:
