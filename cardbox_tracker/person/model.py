@@ -152,9 +152,8 @@ class CameraPose:
     height_stddev_m: float = 0.1  #: its standard deviation, metres; it is no part of a model file
     #: what contradicts the pose, in words, so that no result is sure; it is no part of a model file
     contradiction: str = ""
-    moves: bool = (
-        False  #: whether it moves, so that no place is sure; it is no part of a model file
-    )
+    #: whether it moves, so that no place is sure; it is no part of a model file
+    moves: bool = False
 
     def __post_init__(self) -> None:
         """Check the values."""
