@@ -191,6 +191,7 @@ class WholeBodyFilter:
         location = self._locator.locate(frames, seeing, self._survivors[0])
         cost.choose(seeing)
         cost.observe(frames, terms)
+        self._lean_rad = frames[0].lean_rad
         self._cues = [
             (number, cue) for number in seeing for cue in cost.costs[number].terms if cue.locates
         ]
@@ -202,7 +203,7 @@ class WholeBodyFilter:
         before = self._survivors[0].copy()
         approach, z_m = self.approach, float(before[TORSO_Z])
         approach.see(float(before[TORSO_X]))
-        expected = approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad
+        expected = approach.expected_m, z_m, approach.home_m, self._locator.yaw_rad, self._lean_rad
         shows_legs = any(cue.shows_legs for _, cue in self._cues)
         cost.expect(*expected, bool(self._cues), shows_legs)
         self.rated = RatedStates(cost)

@@ -26,11 +26,10 @@ from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.terms.pose_prior import nats_of
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
-# Values of ``rules`` (15,); ``WholeBodyCostConfig`` describes them.
+# Values of ``rules`` (14,); ``WholeBodyCostConfig`` describes them.
 (
     WEIGHT,
     ROLL_UNIT,
-    PITCH_REST,
     FORWARD_UNIT,
     BACK_UNIT,
     YAW_UNIT,
@@ -43,8 +42,8 @@ from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
     HOME_CAP,
     PENETRATION,
     UNKNOWN_DENSITY,
-) = range(15)
-N_RULES = 15
+) = range(14)
+N_RULES = 14
 
 # The body ends this far below mid-hip, m, so that a hanging arm is not inside the legs.
 _HIPS_END_M = -0.1
@@ -53,9 +52,9 @@ _HIPS_END_M = -0.1
 class Prior(NamedTuple):
     """The priors of one frame."""
 
-    #: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
+    #: x and z of the last frame, the home of x, metres, and expected yaw and lean, rad; (5,).
     anchor: Floats
-    rules: Floats  #: units and weights, (15,)
+    rules: Floats  #: units and weights, (14,)
     gaussians: Floats  #: mixture of an arm's directions, (28, K), see :func:`.pose_prior.nats_of`
 
 
@@ -76,7 +75,7 @@ def torso_prior(state: Floats, given: Prior) -> float:
     if rules[WEIGHT] == 0.0:
         return 0.0
     cap = rules[ANGLE_CAP]
-    pitch = state[PITCH] - rules[PITCH_REST]
+    pitch = state[PITCH] - anchor[4]
     pitch /= rules[BACK_UNIT] if pitch < 0.0 else rules[FORWARD_UNIT]
     rated = _saturating((state[ROLL] / rules[ROLL_UNIT]) ** 2, cap)
     rated += _saturating(pitch**2, cap)
@@ -158,11 +157,10 @@ def priors(state: Floats, body: BodyTuple, prior: PriorTuple) -> tuple[float, fl
 
 
 def rules_of(config: WholeBodyCostConfig) -> Floats:
-    """Return the values of ``rules``, (15,), from the settings."""
+    """Return the values of ``rules``, (14,), from the settings."""
     rules = np.empty(N_RULES)
     rules[WEIGHT] = config.weight
     rules[ROLL_UNIT] = np.radians(config.roll_deg)
-    rules[PITCH_REST] = np.radians(config.pitch_rest_deg)
     rules[FORWARD_UNIT] = np.radians(config.pitch_forward_deg)
     rules[BACK_UNIT] = np.radians(config.pitch_back_deg)
     rules[YAW_UNIT] = np.radians(config.yaw_deg)

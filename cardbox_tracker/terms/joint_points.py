@@ -6,8 +6,7 @@ space, the directions of the bones along the line of sight. Detectors of single 
 camera for level, so these directions are compared along the horizontal line of sight.
 
 The directions of arms are used only for people who were not measured, that of the line of the
-shoulders for all, and that of the trunk if the legs are in the image. Then the detector knows how
-the camera is pitched, so the trunk is compared along the optical axis.
+shoulders for all, and that of the trunk if the legs are in the image.
 
 Without new points, the last ones count for up to a second, less and less, because joints may have
 moved. Points that fit the last posture only with left and right exchanged are exchanged; if this
@@ -61,7 +60,7 @@ POINT_PX = 1.5
 # and mean difference of the detector's from the true one (docs/research.md). That of the shoulders
 # also covers the errors of their curve, see _turned.
 _BONE_DEVIATIONS = np.array([0.22, 0.32, 0.22, 0.32, 0.2, 0.12])
-_BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05, -0.1])
+_BONE_OFFSETS = np.array([0.06, -0.13, 0.06, -0.13, 0.05, -0.15])
 _OLDEST_S = 1.0
 # Points belong to somebody else if the median of their distances from the last posture is larger;
 # after this number of such frames the last posture is taken to be wrong.
@@ -192,7 +191,7 @@ class JointPointsTerm:
                 bones[:SHOULDERS, :2] = 0.0
             if points.legs is None or not points.legs.are_certain:
                 bones[TRUNK, :2] = 0.0
-            away[:TRUNK] = level_sight(self._camera, float(shoulders[:, 0].mean()))
+            away[:] = level_sight(self._camera, float(shoulders[:, 0].mean()))
         return found, deviations, bones, away
 
 

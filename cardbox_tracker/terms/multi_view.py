@@ -99,18 +99,22 @@ class MultiViewCost:
         z_m: float,
         home_m: float,
         yaw_rad: float,
+        lean_rad: float = 0.0,
         is_located: bool = False,
         shows_legs: bool = False,
     ) -> None:
-        """Set the anchor of the priors: place of the last frame, home of x, and expected yaw.
+        """Set the anchor of the priors: place of the last frame, home of x, expected yaw and lean.
 
-        The yaw is that of somebody who faces the camera, 0 if nothing else is known. An outline of
-        a person who is twice as far away determines the distance half as well. The yaw is freer if
-        the person ``is_located`` by points, and the height if these show the legs: who squats.
+        The yaw is that of somebody who faces the camera, 0 if nothing else is known. The lean is 0
+        but for who squats: a person at rest who was expected to lean would lean and be too far
+        away, which hardly changes the outline. An outline of a person who is twice as far away
+        determines the distance half as well. The yaw is freer if the person ``is_located`` by
+        points, and the height if these show the legs: who squats.
         """
         facing_rad = self.facing_rad
         # Who walks to one side turns from the back to it the other way round.
-        self.anchor[:] = x_m, z_m, home_m, facing_rad + (-yaw_rad if facing_rad else yaw_rad)
+        yaw_rad = facing_rad + (-yaw_rad if facing_rad else yaw_rad)
+        self.anchor[:] = x_m, z_m, home_m, yaw_rad, lean_rad
         self.x_factor = max((self.place[0] - x_m) / _NORMAL_M, 1.0)
         config = self._config
         self.yaw_unit_rad = np.radians(config.located_yaw_deg if is_located else config.yaw_deg)
@@ -148,10 +152,10 @@ class MultiViewCost:
 
     def prior(self) -> tuple[FloatArray, FloatArray]:
         """Return mean and inverse variance (14,) of the priors of the torso, without their caps."""
-        config, (x_m, z_m, home_m, yaw_rad) = self._config, self.anchor.tolist()
+        config, (x_m, z_m, home_m, yaw_rad, lean_rad) = self._config, self.anchor.tolist()
         mean, inverse = np.zeros((2, N_STATE))
         inverse[ROLL] = np.radians(config.roll_deg) ** -2
-        inverse[PITCH] = np.radians(config.pitch_forward_deg) ** -2
+        mean[PITCH], inverse[PITCH] = lean_rad, np.radians(config.pitch_forward_deg) ** -2
         mean[YAW], inverse[YAW] = yaw_rad, self.yaw_unit_rad**-2
         step, home = (self.x_factor * np.array([config.x_step_m, config.x_home_m])) ** -2
         inverse[TORSO_X] = step + home

@@ -122,6 +122,7 @@ class Frame:
     before: Posed | None = None
     interval_s: float = USUAL_INTERVAL_S  #: time since the previous frame, s
     stamp_ns: int | None = None  #: time of the frame, ns; None if it is unknown
+    lean_rad: float = 0.0  #: lean of the trunk that the person's legs let expect
 
     def __getitem__(self, channel: str) -> Any:
         """Return the data of a channel; None without data."""

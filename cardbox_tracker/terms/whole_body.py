@@ -90,7 +90,7 @@ class WholeBodyCost:
         pitch_rad: pitch of the camera, rad, positive downwards.
         counted: number of rows of the present silhouette that count, from the top, and width, px.
         silhouette_px: foreground pixels that count in the present silhouette.
-        anchor: x and z of the last frame, the home of x, metres, and the expected yaw, rad; (4,).
+        anchor: x and z of the last frame, home of x, metres, expected yaw and lean, rad; (5,).
         terms: observations of further terms in the present frame.
         covered: pixels (H, W) of other people, not 0, which do not count from the next silhouette
             on; None without any.
@@ -114,7 +114,7 @@ class WholeBodyCost:
         self.terms: tuple[TermObservation, ...] = ()
         self.covered: Silhouette | None = None
         self._outline: Outline | None = None
-        self.anchor = np.zeros(4)
+        self.anchor = np.zeros(5)
         self._prior: priors.PriorTuple = self.anchor, self._rules, self._gaussians
         self.see_nothing()
 

@@ -29,12 +29,9 @@ class WholeBodyCostConfig:
     #: weight of the priors, as a fraction of the silhouette's pixels per unit.
     weight: float = 0.012
     roll_deg: float = 20.0  #: unit of the torso's roll, deg
-    # Postures are relative to the front reference, in which a person rests. With a positive value,
-    # a person at rest would lean forward and be too far away, which hardly changes the outline.
-    pitch_rest_deg: float = 0.0  #: pitch of a person at rest, deg
     # Leaning forward and back lower the head alike in the image, but people lean forward.
-    pitch_forward_deg: float = 13.0  #: unit of a pitch above this value, deg
-    pitch_back_deg: float = 8.0  #: unit of a pitch below this value, deg
+    pitch_forward_deg: float = 13.0  #: unit of a pitch above the expected one, deg
+    pitch_back_deg: float = 8.0  #: unit of a pitch below the expected one, deg
     yaw_deg: float = 14.0  #: unit of the torso's yaw, deg
     #: the same with points of a detector, which show a turn better than an outline, deg.
     located_yaw_deg: float = 24.0

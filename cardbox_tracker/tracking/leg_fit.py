@@ -89,6 +89,17 @@ def points_of(values: Floats, of: Person) -> Floats:
     return points_m
 
 
+def balanced_m(points_m: Floats, facing: Floats) -> float:
+    """Return how far the mass of trunk, head and arms of who stands is ahead of the hips, m.
+
+    ``points_m`` (6, 3) are hips, knees and ankles, and ``facing`` (3,) is where the person faces.
+    """
+    hip, knee, ankle = np.mean(points_m.reshape(2, 3, 3), axis=0) @ facing
+    legs_m = _THIGHS * (hip + _ALONG * (knee - hip)) + _SHANKS * (knee + _ALONG * (ankle - knee))
+    legs_m += _UPPER * hip + (_FEET - 1.0) * ankle
+    return float((_AHEAD_M - legs_m) / _UPPER)
+
+
 @borrowing_kernel
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
     """Write the residuals (35,) of values (12,), and return the sum of their squares."""

@@ -18,6 +18,9 @@ So is the share by which the tracker's distance is wrong, which changes little: 
 could stand on straight legs nearer to the camera. The whole person is moved along the line of sight
 to that distance, unless depth images or a further camera show it.
 
+Who squats leans so far that the trunk is balanced, too. The search of the next image expects this,
+because the slope that the detector finds of a trunk before bent legs is too small.
+
 A leg that the detector does not see keeps its angles, with growing deviations, and is ``hidden``.
 """
 
@@ -86,6 +89,8 @@ _FIXED = 1e-6
 # Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
 # arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
 _BALANCE_M, _UPPER_SHARE = 0.03, 0.626
+# Largest share of its length by which a trunk leans ahead.
+_MOST_LEAN = 0.7
 # Somebody stands who bends the knees by less, rad. Who bends them more, and has not moved the hips
 # by this distance, m, for this time, s, sits. A foot that is higher than the other one by this
 # distance is not on the floor.
@@ -119,7 +124,11 @@ class _Seen(NamedTuple):
 
 
 class LegReader:
-    """Adds the legs to the estimates of one person, from the first camera's points."""
+    """Adds the legs to the estimates of one person, from the first camera's points.
+
+    Attributes:
+        lean_rad: lean of the trunk that balances who squats; 0 for others.
+    """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Start with the usual lengths, and the floor if the camera's height above it is known."""
@@ -143,11 +152,13 @@ class LegReader:
         self._last_s = 0.0
         self._hips_px, self._up_s = np.full((2, 2), np.nan), -np.inf
         self._is_level = False
+        self.lean_rad = 0.0
 
     def see(self, frame: Frame, estimate: Estimate) -> Estimate:
         """Return the ``estimate`` with the legs, once points of the first camera show them."""
         points, camera = frame.points, self._camera
         self._time_s += frame.interval_s
+        self.lean_rad = 0.0
         is_shown = points is not None and points.legs is not None
         if estimate.posture is None or not (is_shown or self._is_known):
             return estimate
@@ -175,10 +186,13 @@ class LegReader:
         vector = information @ shared
         root = np.asarray(np.linalg.cholesky(information), np.float64)
         prior = self._last, np.asarray(change, np.float64), shared, root
-        values, inverse, rms = fit.solve(seen, prior, self._stands(seen, fit.px_per_m))
+        stands = self._stands(seen, fit.px_per_m)
+        values, inverse, rms = fit.solve(seen, prior, stands)
         self._last, self._last_s = values[:_N], time_s
-        feet_m = leg_fit.points_of(values[None], fit.person)[0, [2, 5], 2]
-        self._is_level = abs(feet_m[0] - feet_m[1]) < _STILL_M
+        points_m = leg_fit.points_of(values[None], fit.person)[0]
+        self._is_level = abs(points_m[2, 2] - points_m[5, 2]) < _STILL_M
+        if stands and values[_KNEES].min() > _STRAIGHT_RAD:
+            self.lean_rad = fit.balanced_rad(points_m)
         if values[_KNEES].max() < _STRAIGHT_RAD:
             self._up_s = time_s
         covariance = inverse * max(1.0, rms) ** 2
@@ -233,9 +247,11 @@ class _Fit:
     def __init__(
         self, estimate: Estimate, body: BodyModel, stature_m: float, camera: Camera
     ) -> None:
-        assert estimate.posture is not None
+        assert estimate.posture is not None and estimate.keypoints_m is not None
         self._estimate, self._camera = estimate, camera
         self.hip_m = pose(body, estimate.placed_posture).hip
+        shoulders_m = np.asarray(estimate.keypoints_m)[[0, 3]].mean(axis=0)
+        self._trunk_m = camera.optical_to_reference(shoulders_m) - self.hip_m
         self.px_per_m = camera.fx / max(float(camera.reference_to_optical(self.hip_m)[2]), 0.3)
         self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
         self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
@@ -294,14 +310,17 @@ class _Fit:
         before, _, shared, _ = prior
         others, shown, count = np.empty((0, N_VALUES)), _NOTHING, 1
         if seen is not None:
-            assert self._estimate.keypoints_m is not None
-            shoulders_m = np.asarray(self._estimate.keypoints_m)[[0, 3]].mean(axis=0)
-            upper_m = self._camera.optical_to_reference(shoulders_m) - self.hip_m
-            balance = float(_UPPER_SHARE * upper_m[0]), _BALANCE_M if stands else np.inf
+            balance = float(_UPPER_SHARE * self._trunk_m[0]), _BALANCE_M if stands else np.inf
             others, shown, count = self._folded(seen, shared), (*seen[:4], balance), 4 + 8
         first = np.concatenate([before, shared])
         found, gained, least = leg_fit.fit(first, others, (self.person, self._view, prior, shown))
         return found, np.asarray(np.linalg.inv(gained), np.float64), float(np.sqrt(least / count))
+
+    def balanced_rad(self, points_m: FloatArray) -> float:
+        """Return how far a trunk leans whose mass is balanced over legs (6, 3), rad."""
+        upper_m = _UPPER_SHARE * np.linalg.norm(self._trunk_m)
+        share = leg_fit.balanced_m(points_m, self._turn[:, 0]) / upper_m
+        return float(np.arcsin(np.clip(share, 0.0, _MOST_LEAN)))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.

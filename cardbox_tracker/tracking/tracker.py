@@ -257,7 +257,8 @@ class Tracker:
 
     def follow(self, frames: Sequence[Frame]) -> Estimate:
         """Return the estimate of the posture in :meth:`frames`."""
-        estimate, first = self._found(frames), self.cameras[0]
+        expected = frames[0].changed(lean_rad=self._legs.lean_rad)
+        estimate, first = self._found([expected, *frames[1:]]), self.cameras[0]
         is_found = estimate.posture is not None
         reason = self._doubt_about(frames[0]) if is_found else ""
         found = self._before if is_found else None

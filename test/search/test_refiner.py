@@ -313,3 +313,7 @@ def test_points_show_who_squats_from_a_standing_state(
     assert found[0, TORSO_Z] == pytest.approx(-lower_m, abs=0.1)
     assert found[0, TORSO_X] == pytest.approx(0.0, abs=0.1)
     assert np.degrees(found[0, PITCH]) == pytest.approx(pitch_deg, abs=15.0)
+    # A lean that the legs let expect draws the trunk towards it.
+    seen.cost.expect(0.0, 0.0, 0.0, 0.0, np.radians(40.0), is_located=True, shows_legs=True)
+    more, _ = seen.refine(FRONT[None], [points_cue(points)], Prior(*seen.cost.prior()), 12)
+    assert more[0, PITCH] > found[0, PITCH] + 0.02

@@ -166,7 +166,7 @@ def test_pairs_of_arms_beside_a_trunk_are_rated_as_whole_bodies(seed: int) -> No
 def test_the_torsos_prior_by_hand() -> None:
     of = cost()
     of.see(np.full((120, 160), 255, np.uint8), state())
-    anchor = np.array([0.1, 0.0, 0.14, np.radians(7.0)])
+    anchor = np.array([0.1, 0.0, 0.14, np.radians(7.0), np.radians(20.0)])
 
     def prior(one: np.ndarray) -> float:
         found: float = priors(one, of.body, (anchor, *of._prior[1:]))[0]
@@ -176,12 +176,12 @@ def test_the_torsos_prior_by_hand() -> None:
         return cap * (1.0 - np.exp(-square / cap))
 
     rest = state(x=0.1)
-    rest[3] = anchor[3]
+    rest[[3, 2]] = anchor[3:]
     # Half a unit of 0.08 m from home.
     home = capped(0.25, 4.0)
     assert prior(rest) == pytest.approx(home)
     bowed, back = rest.copy(), rest.copy()
-    bowed[2], back[2] = np.radians(13.0), np.radians(-8.0)
+    bowed[2], back[2] = np.radians(33.0), np.radians(12.0)
     assert prior(bowed) == pytest.approx(home + capped(1.0, 9.0))
     assert prior(back) == pytest.approx(home + capped(1.0, 9.0))
     turned = rest.copy()

@@ -48,6 +48,23 @@ def hidden(time_s: float) -> np.ndarray:
     return posture
 
 
+def test_the_search_expects_the_lean_of_the_legs_found_last(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tracker, expected = Tracker(MEASURED, CAMERA, default_preset()), []
+    expect = tracker.filter._cost.expect
+
+    def noted(*given: Any) -> None:
+        expected.append(given[4])
+        expect(*given)
+
+    monkeypatch.setattr(tracker.filter._cost, "expect", noted)
+    for lean_rad in (0.0, 0.3):
+        tracker._legs.lean_rad = lean_rad
+        tracker.track(silhouette(reference_posture("front")))
+    assert expected[0] == 0.0 and expected[-1] == 0.3
+
+
 def silhouette(posture: np.ndarray, body: BodyModel = MEASURED) -> np.ndarray:
     return render(cardbox_patches(body, posture), CAMERA)
 

@@ -253,13 +253,22 @@ def test_the_mass_of_who_squats_is_over_the_feet(first: FloatArray | None) -> No
         result = reader.see(frame(points), low)
     if first is None:
         assert middle_m(result) < -0.1
+        assert reader.lean_rad == 0.0
         return
+    # With this lean, the middle is where that of somebody who stands is.
+    hips_m = CAMERA.optical_to_reference(result.legs.points_m)[[0, 3]].mean(axis=0)
+    shoulders_m = CAMERA.optical_to_reference(np.array(result.keypoints_m))[[0, 3]].mean(axis=0)
+    trunk_m = np.linalg.norm(shoulders_m - hips_m)
+    moved_m = trunk_m * np.sin(reader.lean_rad) - (shoulders_m - hips_m)[0]
+    assert 0.1 < reader.lean_rad < 0.6
+    assert middle_m(result) + 0.678 * 0.626 * moved_m == pytest.approx(0.05, abs=1e-3)
     pressed_m = middle_m(result)
     assert pressed_m > -0.06
     for _ in range(40):
         # Nobody squats so long without a motion.
         result = reader.see(frame(points), low)
     assert middle_m(result) < pressed_m - 0.02
+    assert reader.lean_rad == 0.0
 
 
 def test_the_floor_shows_the_distance() -> None:
