@@ -18,7 +18,7 @@ from cardbox_tracker.applications.retargeting.joint_map import (
     with_head_and_hands,
 )
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -39,7 +39,7 @@ _FLEXIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_FLEXION, ELBOW_FLEXION]).ravel(
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
-    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
+    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg", "follow", "hand_scale", "rest"),
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
@@ -236,7 +236,7 @@ class Retargeter:
         acceleration = config.max_acceleration or _PER_SECOND * config.max_speed
         self._motion = SafeMotion(
             limits,
-            _start(config.start, method.joints, limits),
+            robot.positions_of("start", config.start, method.joints, 0.0),
             acceleration,
             config.max_jerk or _PER_SECOND * acceleration,
         )
@@ -253,6 +253,7 @@ class Retargeter:
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
         self._offset = np.zeros(len(method.joints))
+        self._wanted: FloatArray | None = None
 
     def begin(self, positions: FloatArray) -> None:
         """Stand still at the robot's ``positions`` (n,); the next image counts as the first."""
@@ -276,6 +277,18 @@ class Retargeter:
         duration_ns = math.ceil(float((np.abs(goal - point) / self.limits.speed).max()) * 1e9)
         self._motion.move(goal, now_ns, duration_ns)
         return held._replace(positions=goal, duration_s=held.duration_s + duration_ns / 1e9)
+
+    def withdraws(self, positions: FloatArray, share: float) -> bool:
+        """Return whether the last image leads back each joint that is off from ``positions`` (n,).
+
+        A joint is off if its command is farther than a ``share`` of the tolerance from the robot,
+        as one is that presses on a table. It is led back to within this share, or to the other side.
+        """
+        if self._wanted is None or self._commanded_ns is None:
+            return False
+        off = (self._motion.set_point(self._commanded_ns) - positions) / self.tolerance
+        wanted = np.sign(off) * (self._wanted - positions) / self.tolerance
+        return bool((wanted[np.abs(off) > share] <= share).all())
 
     def update(
         self,
@@ -301,6 +314,7 @@ class Retargeter:
         now_ns = max(now_ns, self._commanded_ns or now_ns)
         before_ns, self._before_ns = self._before_ns, stamp_ns
         commanded_ns, self._commanded_ns = self._commanded_ns, now_ns
+        self._wanted = None
         if state != TRACKING and not (state == UNCERTAIN and keypoints):
             if state != UNCERTAIN:
                 self._followed_ns = None
@@ -321,6 +335,7 @@ class Retargeter:
         if self._followed_ns is None:
             self._followed_ns = now_ns
             self._offset = point - target if self._config.clutch else np.zeros(len(target))
+        self._wanted = np.where(held, point, target + self._offset)
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
         longest_ns = round(self._config.longest_step_s * 1e9)
@@ -329,7 +344,7 @@ class Retargeter:
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
         # On the way, too, the hand is not in the trunk.
         most = share * self.limits.speed * duration_ns / 1e9
-        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
+        goal = point + np.clip(self._wanted - point, -most, most)
         goal = np.where(held, point, self._method.clear(goal, point))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
@@ -368,27 +383,6 @@ class Retargeter:
             state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
             found.append(state == "tracked" and chance <= self._config.max_chance)
         return np.array(found)
-
-
-def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
-    """Return the positions (n,) of a text ``JOINT=VALUE,...``."""
-    positions = np.clip(np.zeros(len(joints)), limits.lower, limits.upper)
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        name, _, value = part.partition("=")
-        try:
-            number = joints.index(name.strip())
-            positions[number] = float(value)
-        except ValueError:
-            raise CardboxError(
-                f"the start {quoted(part)} is not JOINT=VALUE with one of {', '.join(joints)}"
-            ) from None
-        lower, upper = limits.lower[number], limits.upper[number]
-        if not lower <= positions[number] <= upper:
-            raise CardboxError(
-                f"the start {quoted(part)} is beyond the joint's limits; expected {lower:g} to "
-                f"{upper:g}"
-            )
-    return positions
 
 
 class _Together:

