@@ -19,20 +19,25 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
 from importlib.util import find_spec
+from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import cv2
 import mujoco
 import numpy as np
+from numpy.typing import NDArray
 
 from cardbox_tracker.applications.retargeting.arm import ArmFollower, hand_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import Joint, Robot
 from cardbox_tracker.applications.retargeting.supervisor import Phase, Supervisor
-from cardbox_tracker.applications.simulation.person import person_frames
+from cardbox_tracker.applications.simulation.person import person_frames, person_parts
 from cardbox_tracker.applications.simulation.renderer import Renderer
-from cardbox_tracker.applications.simulation.session import session_camera
+from cardbox_tracker.applications.simulation.session import session_camera, synthetic_cameras
+from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
@@ -67,6 +72,8 @@ _SEES_S, _CORRECTS, _FASTEST, _ELBOW = 0.2, 1.0, 0.4, np.arange(0.5, 2.0, 0.25)
 # the body that the tracker knows, as a share; shares of the looks at a hand that find none, and
 # that find it neither open nor closed.
 _POINT_PX, _STAYS, _SIZES, _UNSEEN, _UNCLEAR = 2.0, 0.8, 0.03, 0.2, 0.05
+# Distance of the wall, m, and noise of a depth camera, as a share.
+_WALL_M, _DEPTH = 4.0, 0.005
 
 
 @dataclass(frozen=True)
@@ -121,7 +128,9 @@ class Chain(NamedTuple):
 
     name: str
     retarget: RetargetConfig
-    sees: str = "points"  #: what the tracker has: ``points``, ``silhouettes``, or the ``truth``
+    #: what the tracker has: one or ``two cameras``, a ``depth camera``, ``silhouettes`` of one
+    #: camera without a detector's points, or the ``truth``
+    sees: str = "one camera"
     has_true_hand: bool = False  #: whether the hand is read without errors
 
 
@@ -225,7 +234,7 @@ class Operator:
         self, world: World, scale: float, stature_m: float, rng: np.random.Generator
     ) -> None:
         """Stand before the camera, the right hand before the shoulder."""
-        self.body = body_from_proportions(stature_m, 2.3, 0.2 * stature_m, -0.03 * stature_m)
+        self.body = body_from_proportions(stature_m, 2.3, 0.19 * stature_m, -0.12 * stature_m)
         self._world, self._rng, self._sway = world, rng, 0.0
         # A length of the person's arm is that many metres of the robot's.
         self._length_m = scale * world.follower.kinematics.reach_m
@@ -326,23 +335,28 @@ class Operator:
 
 
 class Eyes:
-    """Camera, detector and tracker before the person."""
+    """Cameras, detector and tracker before the person."""
 
     def __init__(self, operator: Operator, chain: Chain, rng: np.random.Generator) -> None:
         """Learn the empty scene; the tracker knows the person's body roughly."""
         self._operator, self._chain, self._rng = operator, chain, rng
-        self.camera = session_camera()
         body = operator.body
         sizes = body.sizes * (1.0 + _SIZES * rng.standard_normal(body.sizes.shape))
         self.body = body.with_values(sizes=sizes.round(4))
-        self._renderer = Renderer(self.camera, rng)
-        learner = BackgroundLearner()
-        for _ in range(30):
-            learner.add(self._renderer.image()[0])
-        self._silhouettes = SilhouetteExtractor(learner.model())
-        self._session = Session([self.body], self.camera, rng=rng.spawn(1)[0])
-        self._off_px, self._looks = np.zeros((len(ImagePoints.of({}).px), 2)), 0
-        self._opened: tuple[float, float] = -math.inf, math.nan
+        first = session_camera()
+        count = 2 if chain.sees == "two cameras" else 1
+        self._views = synthetic_cameras(body, first, count)
+        self._renderers = [Renderer(view.camera, rng) for view in self._views]
+        self._silhouettes = []
+        for renderer in self._renderers:
+            learner = BackgroundLearner()
+            for _ in range(30):
+                learner.add(renderer.image()[0])
+            self._silhouettes.append(SilhouetteExtractor(learner.model()))
+        others = [OtherCamera(first.with_pitch(0.0), one.extrinsics) for one in self._views[1:]]
+        self._session = Session([self.body], first, rng=rng.spawn(1)[0], others=others)
+        self._off_px = np.zeros((count, len(POINT_NAMES), 2))
+        self._looks, self._opened = 0, (-math.inf, math.nan)
 
     def see(self, stamp_ns: int) -> dict[str, Any]:
         """Return what retargeting takes of an image."""
@@ -352,41 +366,33 @@ class Eyes:
             found = np.append(posture, [math.nan] * 2)
             of_truth = {"posture": found, "stddev": np.full(len(found), 0.05)}
             return {"state": TRACKING, "body": self._operator.body, "hands": hands, **of_truth}
-        image, _ = self._renderer.image(self._operator.body, posture)
-        points = self._points(posture) if self._chain.sees == "points" else None
-        given = Observation(self._silhouettes(image), image, stamp_ns=stamp_ns, points=points)
+        new_px = _POINT_PX * math.sqrt(1.0 - _STAYS**2)
+        self._off_px = _STAYS * self._off_px + self._rng.normal(0.0, new_px, self._off_px.shape)
+        given = []
+        for number, view in enumerate(self._views):
+            seen = view.seen(self._operator.body, posture)
+            image, _ = self._renderers[number].image(*seen)
+            one = Observation(self._silhouettes[number](image), image, stamp_ns=stamp_ns)
+            if self._chain.sees != "silhouettes":
+                px = view.camera.project(joints_seen(view.camera, *seen)) + self._off_px[number]
+                one = one.having(points=ImagePoints(px, np.full(len(px), 0.9)))
+            if self._chain.sees == "depth camera":
+                one = one.having(depth_m=depth_seen(view.camera, *seen, self._rng))
+            given.append(one)
         (estimate,) = self._session.track(given)
-        found, stddev = estimate.joints[:, rows_of(*POSTURE_GROUPS, Group.NECK)]
-        states = estimate.keypoint_states or ()
-        chances = () if estimate.keypoint_chances is None else estimate.keypoint_chances.tolist()
-        pairs = zip((state.value for state in states), chances, strict=True)
+        rows = rows_of(*POSTURE_GROUPS, Group.NECK)
+        found, stddev = estimate.joints[:, rows] if estimate.posture is not None else (None, None)
+        states, chances = estimate.keypoint_states, estimate.keypoint_chances
+        known = states is not None and chances is not None
+        pairs = zip((str(state) for state in states), chances.tolist()) if known else ()
         return {
             "state": estimate.state,
             "body": self._session.trackers[0].body,
-            "posture": found if estimate.posture is not None else None,
-            "stddev": stddev if estimate.posture is not None else None,
+            "posture": found,
+            "stddev": stddev,
             "hands": hands,
-            "keypoints": dict(zip(KEYPOINT_NAMES, pairs, strict=False)),
+            "keypoints": dict(zip(KEYPOINT_NAMES, pairs)),
         }
-
-    def _points(self, posture: FloatArray) -> ImagePoints:
-        """Return what a detector finds: the true joints, with errors that change slowly."""
-        posed = person_frames(self._operator.body, posture)
-        places: dict[str, FloatArray] = dict(zip(KEYPOINT_NAMES, posed.keypoints_m, strict=True))
-        turn, waist = posed.torso_rotation, body_parts(self._operator.body.sizes).waist
-        ahead, left = turn[:, 0], turn[:, 1]
-        places["nose"] = posed.head + 0.1 * ahead
-        for side, sign in (("left", 1.0), ("right", -1.0)):
-            elbow_m, hand_m = places[f"{side}_elbow"], places.pop(f"{side}_hand")
-            places[f"{side}_wrist"] = elbow_m + WRIST_SHARE * (hand_m - elbow_m)
-            places |= dict.fromkeys((f"{side}_index", f"{side}_little_finger"), hand_m)
-            places[f"{side}_hip"] = posed.hip + sign * 0.25 * waist.bottom_width_m * left
-            places[f"{side}_ear"] = posed.head + sign * 0.07 * left
-            places[f"{side}_eye"] = posed.head + 0.08 * ahead + sign * 0.03 * left
-        new_px = _POINT_PX * math.sqrt(1.0 - _STAYS**2)
-        self._off_px = _STAYS * self._off_px + self._rng.normal(0.0, new_px, self._off_px.shape)
-        optical = self.camera.reference_to_optical(np.array([places[one] for one in POINT_NAMES]))
-        return ImagePoints(self.camera.project(optical) + self._off_px, np.full(len(optical), 0.9))
 
     def _hand(self, now_s: float) -> float:
         """Return how open the right hand is; each hand is looked at in every second image."""
@@ -397,6 +403,40 @@ class Eyes:
         if self._looks % 2 and self._rng.random() > _UNSEEN:
             self._opened = now_s, 0.5 if self._rng.random() < _UNCLEAR else is_open
         return self._opened[1] if now_s - self._opened[0] <= KEPT_S else math.nan
+
+
+def joints_seen(camera: Camera, body: BodyModel, posture: FloatArray) -> FloatArray:
+    """Return where the joints are that a detector finds, (17, 3), m in the optical frame."""
+    posed = person_frames(body, posture)
+    places: dict[str, FloatArray] = dict(zip(KEYPOINT_NAMES, posed.keypoints_m, strict=True))
+    ahead, left = posed.torso_rotation[:, 0], posed.torso_rotation[:, 1]
+    places["nose"] = posed.head + 0.1 * ahead
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        elbow_m, hand_m = places[f"{side}_elbow"], places.pop(f"{side}_hand")
+        places[f"{side}_wrist"] = elbow_m + WRIST_SHARE * (hand_m - elbow_m)
+        places |= dict.fromkeys((f"{side}_index", f"{side}_little_finger"), hand_m)
+        hip_m = 0.25 * body_parts(body.sizes).waist.bottom_width_m
+        places[f"{side}_hip"] = posed.hip + sign * hip_m * left
+        places[f"{side}_ear"] = posed.head + sign * 0.07 * left
+        places[f"{side}_eye"] = posed.head + 0.08 * ahead + sign * 0.03 * left
+    return camera.reference_to_optical(np.array([places[name] for name in POINT_NAMES]))
+
+
+def depth_seen(
+    camera: Camera, body: BodyModel, posture: FloatArray, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return the depth image (H, W) of a person before a wall, m, with the noise of a camera."""
+    depth_m = np.full((camera.height, camera.width), _WALL_M, np.float32)
+    parts = person_parts(body, posture)
+    for part in sorted(parts, key=lambda part: float(part.rings[..., 0].mean())):
+        optical = camera.reference_to_optical(part.rings)
+        px = np.rint(camera.project(optical)).astype(np.int32)
+        for pair, near in zip(pairwise(px), pairwise(optical[..., 2]), strict=True):
+            # The nearer half of both rings is the surface that is seen.
+            surface_m = np.sort(np.concatenate(near))[: px.shape[1]].mean()
+            cv2.fillConvexPoly(depth_m, cv2.convexHull(np.concatenate(pair)), float(surface_m))
+    noise = rng.standard_normal(depth_m.shape, dtype=np.float32)
+    return np.asarray(depth_m * (1.0 + _DEPTH * noise), np.float32)
 
 
 class Try(NamedTuple):
@@ -459,6 +499,8 @@ def chains_of(arm: Arm) -> tuple[Chain, ...]:
     return (
         whole,
         whole._replace(name="true postures", sees="truth"),
+        whole._replace(name="two cameras", sees="two cameras"),
+        whole._replace(name="depth camera", sees="depth camera"),
         whole._replace(name="silhouettes alone", sees="silhouettes"),
         whole._replace(name="true opening of the hand", has_true_hand=True),
         whole._replace(name="max_speed 4", retarget=replace(usual, max_speed=4.0)),

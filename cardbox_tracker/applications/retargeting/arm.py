@@ -295,7 +295,8 @@ class ArmFollower:
         joints: the arm's joints and the gripper, if there is one.
         mount: rotation matrix (3, 3) from the robot's root to the person's torso.
         turned_deg: the part of its yaw that no setting has, as the robot's shoulders tell it.
-        sources: for each joint, the joints of the person's arm; the hand for the gripper.
+        sources: for each joint, the joints of the person's arm, or the keypoint of the hand that
+            is followed alone; how open the hand is for the gripper.
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
@@ -305,7 +306,9 @@ class ArmFollower:
         self.kinematics = Kinematics(self.arm, config.trunk_radius_m, config.lowest_m)
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
-        behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
+        self._is_hand, self._scale = config.follow == "hand", config.hand_scale
+        followed = ("hand",) if self._is_hand else ARM_JOINTS
+        behind = tuple(f"{self._side}_{name}" for name in followed)
         hand = (f"{self._side}_hand_open",)
         self.sources = (*(behind for _ in self.arm.joints), *(hand for _ in gripper))
         self._lower, self._upper, _ = robot.limits_of(self.joints)
@@ -326,7 +329,6 @@ class ArmFollower:
         # A slide or an arm of several turns has a wide range, of which a turn suffices.
         rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
         rest = robot.positions_of("rest", config.rest, self.arm.joints, rest)
-        self._is_hand, self._scale = config.follow == "hand", config.hand_scale
         self._tilt = self.kinematics.at(rest).turn[2]
         limits = {"low": self._low, "high": self._high}
         self._rules = rules_of(

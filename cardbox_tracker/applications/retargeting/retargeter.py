@@ -29,13 +29,18 @@ from cardbox_tracker.person.posture import (
     SHOULDER_FLEXION,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 FOLLOWING = "following"
 # Abduction and flexion of each limb in a posture.
 _ABDUCTIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_ABDUCTION, ELBOW_ABDUCTION]).ravel()
 _FLEXIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_FLEXION, ELBOW_FLEXION]).ravel()
+# The keypoint that tells of each joint of the person: the angles at the shoulder are those of the
+# elbow's place, these of the hand's.
+_ENDS = [
+    f"{name.partition('_')[0]}_{'hand' if '_elbow_' in name else 'elbow'}" for name in JOINT_NAMES
+]
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
@@ -53,7 +58,7 @@ class Method(Protocol):
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint of the robot, what its target depends on: joints of the person, hands."""
+        """For each joint of the robot, what its target depends on: joints or keypoints, hands."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -245,7 +250,9 @@ class Retargeter:
         # (n, 12): whether a joint of the robot follows one of the person.
         sources = method.sources
         self._sources = np.array([[one in names for one in JOINT_NAMES] for names in sources])
-        self._follows = self._sources.any(axis=1)
+        # (n, 6): the same for keypoints, of which the place is followed.
+        self._places = np.array([[one in names for one in KEYPOINT_NAMES] for names in sources])
+        self._follows = self._sources.any(axis=1) | self._places.any(axis=1)
         grips = [not set(HAND_OPEN_NAMES).isdisjoint(names) for names in sources]
         most = np.minimum(config.max_following_error, (limits.upper - limits.lower) / 4)
         self.tolerance = np.where(grips, np.inf, most)
@@ -363,7 +370,7 @@ class Retargeter:
         abduction: what follows both angles of a limb needs the direction alone.
         """
         given = np.stack([posture[:N_JOINTS], stddev[:N_JOINTS]])
-        sure = np.isfinite(given).all(axis=0) & self._tracked(keypoints)
+        sure = np.isfinite(given).all(axis=0) & self._tracked(_ENDS, keypoints)
         angles, spread = np.where(sure, given, 0.0)
         bent, shaking = angles[_FLEXIONS], spread[_FLEXIONS]
         # The root of the mean square of the cosine, in which the abduction turns the limb.
@@ -371,18 +378,16 @@ class Retargeter:
         spreads = np.tile(spread, (len(self._sources), 1))
         spreads[:, _ABDUCTIONS] *= np.where(self._sources[:, _FLEXIONS], turned, 1.0)
         is_held = self._sources & ~(sure & (spreads <= self._config.max_stddev_rad))
-        return np.asarray(is_held.any(axis=1))
+        is_lost = self._places & ~self._tracked(KEYPOINT_NAMES, keypoints)
+        return np.asarray(is_held.any(axis=1) | is_lost.any(axis=1))
 
-    def _tracked(self, keypoints: Mapping[str, tuple[str, float]]) -> NDArray[np.bool_]:
-        """Return for which joints of the person (12,) the keypoint is tracked, or not known."""
-        found = []
-        for name in JOINT_NAMES:
-            side, _, joint = name.partition("_")
-            # The angles at the shoulder are those of the elbow's place, these of the hand's.
-            end = "hand" if joint.startswith("elbow") else "elbow"
-            state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
-            found.append(state == "tracked" and chance <= self._config.max_chance)
-        return np.array(found)
+    def _tracked(
+        self, names: Sequence[str], keypoints: Mapping[str, tuple[str, float]]
+    ) -> NDArray[np.bool_]:
+        """Return which keypoints (n,) of these names are tracked, or not known."""
+        known = [keypoints.get(name, ("tracked", 0.0)) for name in names]
+        most = self._config.max_chance
+        return np.array([state == "tracked" and chance <= most for state, chance in known])
 
 
 class _Together:
