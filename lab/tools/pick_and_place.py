@@ -12,6 +12,7 @@ the whole chain, one part at a time is replaced: by the truth, or by what there 
 from __future__ import annotations
 
 import argparse
+import json
 import math
 import sys
 from collections import Counter, deque
@@ -48,6 +49,7 @@ from cardbox_tracker.person.posture import JOINT_LIMITS, RIGHT_ARM, TORSO_Y, ref
 from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, POSTURE_GROUPS, Group, rows_of
+from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner
 from cardbox_tracker.tracking.estimate import KEPT_S, TRACKING
@@ -57,12 +59,10 @@ from lab.pages import replaced, table
 
 BEGIN, END = "<!-- pick-and-place:begin -->", "<!-- pick-and-place:end -->"
 STATURES_M = 1.58, 1.72, 1.88
-TOLERANCE_M = 0.03
-"""Distance of the cube from the goal within which it is placed."""
 LONGEST_S = 60.0
 """Time after which a try has failed."""
-# A tick of the robot, s; images come every third one, and their commands one image later.
-_TICK_S, _TICKS = 0.02, 3
+# A tick of the robot, s; images come every fourth one, and their commands one image later.
+_TICK_S, _TICKS = 0.02, 4
 _TICK_NS = round(_TICK_S * 1e9)
 # The person sees the robot so late, s, corrects this share of what it is off in a second, and moves
 # the hand at most so fast, lengths of the arm a second. Elbows are so far outwards, rad:
@@ -72,6 +72,8 @@ _SEES_S, _CORRECTS, _FASTEST, _ELBOW = 0.2, 1.0, 0.4, np.arange(0.5, 2.0, 0.25)
 # the body that the tracker knows, as a share; shares of the looks at a hand that find none, and
 # that find it neither open nor closed.
 _POINT_PX, _STAYS, _SIZES, _UNSEEN, _UNCLEAR = 2.0, 0.8, 0.03, 0.2, 0.05
+# Steps in which the gripper has to be within half of the cube's side instead of the whole.
+_EXACT = "reaching down", "lowering"
 # Distance of the wall, m, and noise of a depth camera, as a share.
 _WALL_M, _DEPTH = 4.0, 0.005
 
@@ -106,7 +108,6 @@ class Arm:
         size = [self.cube_m / 2] * 3
         contact = {"friction": [1.0, 0.05, 0.001], "condim": 4, "solref": [0.005, 1.0]}
         cube.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=size, density=500.0, **contact)
-        spec.option.timestep = 0.001
         return spec.compile()
 
 
@@ -221,10 +222,10 @@ class World:
 
     @property
     def is_placed(self) -> bool:
-        """Whether the cube lies at the goal."""
+        """Whether the cube lies on the table, within its side's length of the goal."""
         off = self.seen.cube_m - self.goal_m
         is_down = abs(float(off[2])) < 0.1 * self.arm.cube_m
-        return is_down and float(np.linalg.norm(off[:2])) <= TOLERANCE_M
+        return is_down and float(np.linalg.norm(off[:2])) <= self.arm.cube_m
 
 
 class Operator:
@@ -316,8 +317,8 @@ class Operator:
     def _reach(self, step: str, to_m: FloatArray) -> Iterator[bool]:
         """Move the gripper there until it stays, or the cube is lost on the way."""
         self.step, self._wanted_m, stays = step, to_m, 0
-        near_m = (0.6 if "down" in step or "low" in step else 1.0) * 0.4 * self._world.arm.cube_m
-        while stays * _TICK_S < 0.3:
+        near_m = (0.5 if step in _EXACT else 1.0) * self._world.arm.cube_m
+        while stays * _TICK_S < 0.2:
             is_near = float(np.linalg.norm(self._past[0].tip_m - to_m)) < near_m
             stays = stays + 1 if is_near else 0
             if step in ("carrying", "lowering") and not self._is_held:
@@ -354,7 +355,9 @@ class Eyes:
                 learner.add(renderer.image()[0])
             self._silhouettes.append(SilhouetteExtractor(learner.model()))
         others = [OtherCamera(first.with_pitch(0.0), one.extrinsics) for one in self._views[1:]]
-        self._session = Session([self.body], first, rng=rng.spawn(1)[0], others=others)
+        config = default_preset().changed({"whole_body": {"effort": 0.5}})
+        config = config.with_depth() if chain.sees == "depth camera" else config
+        self._session = Session([self.body], first, config, rng.spawn(1)[0], others)
         self._off_px = np.zeros((count, len(POINT_NAMES), 2))
         self._looks, self._opened = 0, (-math.inf, math.nan)
 
@@ -489,20 +492,75 @@ def one_try(arm: Arm, chain: Chain, stature_m: float, seed: int) -> Try:
     for _ in range(round(1.0 / _TICK_S)):
         world.step()
     step = "" if not goes_on else operator.step
-    return Try(world.is_placed, step, tick * _TICK_S, held / tick, float(np.median(off or [np.nan])))
+    took_s, share = round(tick * _TICK_S, 2), round(held / tick, 4)
+    return Try(world.is_placed, step, took_s, share, round(float(np.median(off or [np.nan])), 4))
 
 
 def chains_of(arm: Arm) -> tuple[Chain, ...]:
     """Return the whole chain, and those of which one part is another."""
     usual = RetargetConfig(follow="hand", hand_scale=0.7, rest=arm.rest, lowest_m=0.005)
-    whole = Chain("whole chain", usual)
+    whole = Chain("whole chain", usual, "two cameras")
+    true = whole._replace(name="true postures", sees="truth")
+    directions = replace(usual, follow="arm", rest="")
     return (
         whole,
-        whole._replace(name="true postures", sees="truth"),
-        whole._replace(name="two cameras", sees="two cameras"),
-        whole._replace(name="depth camera", sees="depth camera"),
-        whole._replace(name="silhouettes alone", sees="silhouettes"),
+        true,
         whole._replace(name="true opening of the hand", has_true_hand=True),
         whole._replace(name="max_speed 4", retarget=replace(usual, max_speed=4.0)),
-        whole._replace(name="the arm's directions", retarget=replace(usual, follow="arm")),
+        whole._replace(name="depth camera", sees="depth camera"),
+        whole._replace(name="one camera", sees="one camera"),
+        whole._replace(name="one camera, no detector", sees="silhouettes"),
+        true._replace(name="true postures, follow: arm", retarget=directions),
     )
+
+
+def page(tries: Sequence[dict[str, Any]]) -> str:
+    """Return the table of all tries."""
+    head = ("robot", "chain", "placed", *(f"{one:g} m" for one in STATURES_M))
+    head = (*head, "time", "held", "hand off", "lost while")
+    rows = []
+    for arm in ARMS:
+        for chain in chains_of(arm):
+            own = [one for one in tries if (one["arm"], one["chain"]) == (arm.name, chain.name)]
+            bodies = [[one for one in own if one["stature_m"] == size] for size in STATURES_M]
+            counts = [f"{sum(one['is_placed'] for one in some)} of {len(some)}" for some in bodies]
+            placed = [one for one in own if one["is_placed"]]
+            if own:
+                lost = Counter(one["step"] or "placing" for one in own if not one["is_placed"])
+                means = (float(np.median([one[name] for one in own])) for name in ("held", "off"))
+                time_s = np.median([one["took_s"] for one in placed or own])
+                rate = f"{len(placed)} of {len(own)}, {len(placed) / len(own):.0%}"
+                words = ", ".join(f"{step} {count}" for step, count in lost.most_common())
+                cells = (f"{time_s:.0f} s", *(f"{mean:.0%}" for mean in means), words)
+                rows.append((arm.name, chain.name, rate, *counts, *cells))
+    return table(head, rows)
+
+
+def main(args: list[str] | None = None) -> int:
+    """Make the tries that are not in the file beside the page yet, and write both."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--output", type=Path, required=True, help="the page, with marks")
+    parser.add_argument("--seeds", type=int, default=50, help="tries of the whole chain")
+    parser.add_argument("--others", type=int, default=6, help="tries of each other chain")
+    given = parser.parse_args(args)
+    file = given.output.with_suffix(".json")
+    tries = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else []
+    known = {(one["arm"], one["chain"], one["seed"]) for one in tries}
+    for seed in range(given.seeds):
+        for arm in ARMS:
+            for number, chain in enumerate(chains_of(arm)):
+                if (arm.name, chain.name, seed) in known or (number and seed >= given.others):
+                    continue
+                stature_m = STATURES_M[seed % len(STATURES_M)]
+                found = one_try(arm, chain, stature_m, seed)
+                of = {"arm": arm.name, "chain": chain.name, "seed": seed, "stature_m": stature_m}
+                tries.append(of | found._asdict())
+                print(*tries[-1].values(), flush=True)
+                write_file(file, "[\n" + ",\n".join(map(json.dumps, tries)) + "\n]\n")
+    text = given.output.read_text(encoding="utf-8")
+    write_file(given.output, replaced(text, f"\n{page(tries)}\n", BEGIN, END))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

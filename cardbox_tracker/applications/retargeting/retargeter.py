@@ -260,7 +260,6 @@ class Retargeter:
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
         self._offset = np.zeros(len(method.joints))
-        self._wanted: FloatArray | None = None
 
     def begin(self, positions: FloatArray) -> None:
         """Stand still at the robot's ``positions`` (n,); the next image counts as the first."""
@@ -277,25 +276,16 @@ class Retargeter:
         return self._stop(reason, now_ns)
 
     def hold_near(self, positions: FloatArray, reason: str, now_ns: int) -> Command:
-        """Return the command to stop within the ``tolerance`` of where the robot is, (n,)."""
+        """Return the command to stop within a third of the ``tolerance`` of the robot, (n,).
+
+        So one that presses on something is released, and can be led away from it.
+        """
         held = self.hold(reason, now_ns)
-        point = self._motion.set_point(now_ns)
-        goal = np.clip(point, positions - self.tolerance, positions + self.tolerance)
+        point, near = self._motion.set_point(now_ns), self.tolerance / 3
+        goal = np.clip(point, positions - near, positions + near)
         duration_ns = math.ceil(float((np.abs(goal - point) / self.limits.speed).max()) * 1e9)
         self._motion.move(goal, now_ns, duration_ns)
         return held._replace(positions=goal, duration_s=held.duration_s + duration_ns / 1e9)
-
-    def withdraws(self, positions: FloatArray, share: float) -> bool:
-        """Return whether the last image leads back each joint that is off from ``positions`` (n,).
-
-        A joint is off if its command is farther than a ``share`` of the tolerance from the robot,
-        as one is that presses on a table. It is led back to within this share, or to the other side.
-        """
-        if self._wanted is None or self._commanded_ns is None:
-            return False
-        off = (self._motion.set_point(self._commanded_ns) - positions) / self.tolerance
-        wanted = np.sign(off) * (self._wanted - positions) / self.tolerance
-        return bool((wanted[np.abs(off) > share] <= share).all())
 
     def update(
         self,
@@ -321,7 +311,6 @@ class Retargeter:
         now_ns = max(now_ns, self._commanded_ns or now_ns)
         before_ns, self._before_ns = self._before_ns, stamp_ns
         commanded_ns, self._commanded_ns = self._commanded_ns, now_ns
-        self._wanted = None
         if state != TRACKING and not (state == UNCERTAIN and keypoints):
             if state != UNCERTAIN:
                 self._followed_ns = None
@@ -342,7 +331,6 @@ class Retargeter:
         if self._followed_ns is None:
             self._followed_ns = now_ns
             self._offset = point - target if self._config.clutch else np.zeros(len(target))
-        self._wanted = np.where(held, point, target + self._offset)
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
         longest_ns = round(self._config.longest_step_s * 1e9)
@@ -351,7 +339,7 @@ class Retargeter:
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
         # On the way, too, the hand is not in the trunk.
         most = share * self.limits.speed * duration_ns / 1e9
-        goal = point + np.clip(self._wanted - point, -most, most)
+        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
         goal = np.where(held, point, self._method.clear(goal, point))
         self._motion.move(goal, now_ns, duration_ns, share)
         return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)

@@ -116,11 +116,9 @@ class Supervisor:
                 return command
         elif self.phase not in _MOVING:
             return command
-        command = update(clock_ns)
         if self._is_off and self._robot is not None:
-            if not self._retargeter.withdraws(self._robot[1], _RELEASED):
-                return self._near(self._robot[1], now_ns)
-            self._is_off = False
+            return self._near(self._robot[1], now_ns)
+        command = update(clock_ns)
         self._reason = "" if command.is_moving else command.reason
         if command.is_moving or self.phase is not Phase.READY:
             self.phase = Phase.FOLLOWING if command.is_moving else Phase.HOLDING
