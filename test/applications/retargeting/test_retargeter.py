@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from cardbox_tracker.applications.retargeting.arm import ArmFollower
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.retargeter import (
@@ -175,6 +176,23 @@ def test_a_joint_holds_while_its_own_keypoints_are_not_tracked() -> None:
     keypoints = {**seen, "right_elbow": ("tracked", 0.6), "right_hand": ("tracked", 0.6)}
     command = robot.update(10**9, "uncertain", BODY, posture, SURE, keypoints=keypoints)
     assert not command.is_moving or not robot.at(2 * 10**9).velocities.any()
+
+
+@pytest.mark.parametrize(
+    ("elbow", "hand", "moves"),
+    [("uncertain", "tracked", True), ("tracked", "uncertain", False)],
+)
+def test_of_a_hand_that_is_followed_alone_its_keypoint_decides(
+    elbow: str, hand: str, moves: bool
+) -> None:
+    config = RetargetConfig(follow="hand")
+    robot = Retargeter(ROBOT, ArmFollower(ROBOT, config), config)
+    keypoints = {"right_elbow": (elbow, 0.3), "right_hand": (hand, 0.3)}
+    # The elbow may be anywhere about the line from the shoulder to the hand.
+    given = "uncertain", BODY, np.full(12, 0.3), np.full(12, 3.0)
+    for tenth in range(5):
+        command = robot.update(tenth * 10**8, *given, keypoints=keypoints)
+    assert command.is_moving == moves
 
 
 @pytest.mark.parametrize(
