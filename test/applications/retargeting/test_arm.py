@@ -122,7 +122,7 @@ def test_the_hand_alone_is_followed_upright_whatever_the_elbow_does(scale: float
 
 
 def test_a_rest_of_another_joint_is_refused() -> None:
-    with pytest.raises(CardboxError, match="rest 'jaw=1' is not JOINT=VALUE.*wrist_pitch"):
+    with pytest.raises(CardboxError, match=r"rest 'jaw=1' is not JOINT=VALUE.*wrist_pitch"):
         ArmFollower(ROBOT, RetargetConfig(rest="jaw=1"))
     with pytest.raises(CardboxError, match="rest 'elbow_pitch=9' is beyond"):
         ArmFollower(ROBOT, RetargetConfig(rest="elbow_pitch=9"))
