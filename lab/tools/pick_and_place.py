@@ -327,13 +327,15 @@ class Operator:
         return float(np.linalg.norm(seen.cube_m - seen.tip_m)) < 1.2 * self._world.arm.cube_m
 
     def _reach(self, step: str, to_m: FloatArray) -> Iterator[bool]:
-        """Move the gripper there until it stays, or the cube is lost on the way."""
-        self.step, self._wanted_m, stays = step, to_m, 0
+        """Move the gripper, or the cube in it, there until it stays; end if the cube is lost."""
+        self.step, stays, carries = step, 0, step in ("carrying", "lowering")
         near_m = (0.5 if step in _EXACT else 1.0) * self._world.arm.cube_m
         while stays * _TICK_S < 0.2:
-            is_near = float(np.linalg.norm(self._past[0].tip_m - to_m)) < near_m
+            seen = self._past[0]
+            self._wanted_m = to_m + (seen.tip_m - seen.cube_m if carries else 0.0)
+            is_near = float(np.linalg.norm(seen.tip_m - self._wanted_m)) < near_m
             stays = stays + 1 if is_near else 0
-            if step in ("carrying", "lowering") and not self._holds():
+            if carries and not self._holds():
                 return
             yield True
 
