@@ -24,6 +24,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
+from cardbox_tracker.tracking.estimate import CLOSED, OPEN
 
 ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
 _STEPS, _LARGEST_STEP, _CLOSE = 12, 0.8, 3e-2
@@ -322,6 +323,7 @@ class ArmFollower:
         angles = np.radians(mount_deg + np.array([0.0, 0.0, self.turned_deg]))
         self.mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
         self._solution: FloatArray | None = None
+        self._grip: float | None = None
         self._turn = 0
         random = np.random.default_rng(0)
         count = len(self.arm.joints)
@@ -352,8 +354,12 @@ class ArmFollower:
                 best = other
         self._solution = best
         found = np.array([*best, *now[len(best) :]])
-        if self.arm.gripper and np.isfinite(posture[self._hand]):
-            found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
+        hand = float(posture[self._hand])
+        if self.arm.gripper and np.isfinite(hand):
+            # A hand that is neither open nor closed does not drop what it holds.
+            if hand > OPEN or hand < CLOSED:
+                self._grip = self._open if hand > OPEN else self._closed
+            found[-1] = found[-1] if self._grip is None else self._grip
         return found
 
     def axes(self, positions: FloatArray) -> FloatArray:

@@ -199,14 +199,18 @@ GRIPPER = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><li
 <limit lower="0" upper="0.04" velocity="1"/></joint></robot>"""
 
 
-@pytest.mark.parametrize(("open_at", "expected"), [("upper", 0.03), ("lower", 0.01)])
-def test_the_gripper_opens_with_the_hand(open_at: str, expected: float) -> None:
+@pytest.mark.parametrize(("open_at", "expected"), [("upper", 0.04), ("lower", 0.0)])
+def test_the_gripper_opens_and_closes_with_the_hand(open_at: str, expected: float) -> None:
     follower = ArmFollower(parse_robot(GRIPPER), RetargetConfig(gripper_open=open_at))
     assert follower.joints == ("pan", "lift", "elbow", "jaw_slide")
     wanted = posture()
     assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == 0.02  # no hand: it stays
-    wanted[15] = 0.75
-    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == pytest.approx(expected)
+    # A hand that is neither leaves the gripper as it is, or on its way.
+    for hand, there in ((0.5, 0.02), (0.8, expected), (0.5, expected), (0.2, 0.04 - expected)):
+        wanted[15] = hand
+        assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == pytest.approx(there)
+    wanted[15] = np.nan
+    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == 0.02
 
 
 def test_a_mimic_moves_with_its_joint() -> None:
