@@ -145,7 +145,6 @@ class Chain(NamedTuple):
     #: what the tracker has: one or ``two cameras``, a ``depth camera``, ``silhouettes`` of one
     #: camera without a detector's points, or the ``truth``
     sees: str = "one camera"
-    has_true_hand: bool = False  #: whether the hand is read without errors
 
 
 def robot_of(model: Any, arm: Arm) -> Robot:
@@ -409,12 +408,10 @@ class Eyes:
 
     def _hand(self, now_s: float) -> float:
         """Return how open the right hand is; each hand is looked at in every second image."""
-        is_open = float(self._operator.is_open)
-        if self._chain.has_true_hand:
-            return is_open
         self._looks += 1
         if self._looks % 2 and self._rng.random() > _UNSEEN:
-            self._opened = now_s, 0.5 if self._rng.random() < _UNCLEAR else is_open
+            is_clear = self._rng.random() >= _UNCLEAR
+            self._opened = now_s, float(self._operator.is_open) if is_clear else 0.5
         return self._opened[1] if now_s - self._opened[0] <= KEPT_S else math.nan
 
 
@@ -515,8 +512,6 @@ def chains_of(arm: Arm) -> tuple[Chain, ...]:
     return (
         whole,
         true,
-        whole._replace(name="true opening of the hand", has_true_hand=True),
-        whole._replace(name="max_speed 4", retarget=replace(usual, max_speed=4.0)),
         whole._replace(name="depth camera", sees="depth camera"),
         whole._replace(name="one camera", sees="one camera"),
         whole._replace(name="one camera, no detector", sees="silhouettes"),
