@@ -329,8 +329,11 @@ class ArmFollower:
         count = len(self.arm.joints)
         self._low, self._high = self._lower[:count], self._upper[:count]
         # A slide or an arm of several turns has a wide range, of which a turn suffices.
-        rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
-        rest = robot.positions_of("rest", config.rest, self.arm.joints, rest)
+        # With both sides, the other arm's joints may be named, too.
+        named = tuple(robot.joints) if config.side == "both" else self.arm.joints
+        middle = np.clip(np.mean(robot.limits_of(named)[:2], axis=0), -np.pi, np.pi)
+        at_rest = robot.positions_of("rest", config.rest, named, middle)
+        rest = at_rest[[named.index(name) for name in self.arm.joints]]
         self._tilt = self.kinematics.at(rest).turn[2]
         limits = {"low": self._low, "high": self._high}
         self._rules = rules_of(

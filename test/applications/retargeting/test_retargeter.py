@@ -283,6 +283,20 @@ def test_two_arms_do_not_touch_and_part_again(tmp_path: Path, apart_m: float) ->
     assert seen[-1] > 0.25
 
 
+def test_the_rest_may_be_of_both_arms(tmp_path: Path) -> None:
+    """The free turn of each straight arm goes to its own rest."""
+    path = two_arms(tmp_path / "two.urdf")
+    rest = "left_wrist_roll=1,right_wrist_roll=-1"
+    _, robot, _ = make_retargeter(path, None, RetargetConfig(side="both", rest=rest))
+    found = np.zeros(len(robot.joints))
+    for _ in range(8):
+        found = robot._method.target(BODY, np.append(np.zeros(12), [np.nan] * 4), found)
+    rolls = [found[robot.joints.index(f"{side}_wrist_roll")] for side in ("left", "right")]
+    assert rolls == pytest.approx([1.0, -1.0], abs=0.05)
+    with pytest.raises(CardboxError, match="'wrist_roll=1' is not JOINT=VALUE"):
+        make_retargeter(path, None, RetargetConfig(side="both", rest="wrist_roll=1"))
+
+
 def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:
     """Each arm is the example arm, by its names."""
     joint = (
