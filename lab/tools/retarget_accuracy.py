@@ -38,6 +38,7 @@ DOCUMENT, ROBOT = ROOT / "docs" / "retargeting.md", ROOT / "config" / "example_a
 BEGIN, END = "<!-- retarget-accuracy:begin -->", "<!-- retarget-accuracy:end -->"
 LAG_BEGIN, LAG_END = "<!-- retarget-lag:begin -->", "<!-- retarget-lag:end -->"
 _LAG_HEAD = ("robot", "max_speed", "shoulder to hand", "lag")
+_POSITIONS = 20_000
 _SPEEDS, _STEP_NS, _LONGEST_LAG = (1.0, 2.0, 4.0, 8.0), 10_000_000, 60
 _HEAD = ("robot", "side", "upper arm", "forearm", "shoulder to hand", "at a limit", "time")
 
@@ -104,6 +105,26 @@ def row_of(
     return row((name, side, *shares, f"{np.mean(limited):.0%}", f"{took_ms:.0f} ms"))
 
 
+def least_of(
+    robot: Robot, side: str, body: BodyModel, postures: FloatArray, lowest_m: float
+) -> str:
+    """Return the least angles from shoulder to hand above a table, whatever the arm does else.
+
+    They are median and nine in ten, degrees, by random positions of the arm's joints.
+    """
+    follower = ArmFollower(robot, RetargetConfig(side=side, trunk_radius_m=0.0, lowest_m=lowest_m))
+    kinematics, rng = follower.kinematics, np.random.default_rng(0)
+    lower, upper, _ = robot.limits_of(follower.arm.joints)
+    positions = rng.uniform(lower, upper, (_POSITIONS, len(lower)))
+    free = [one for one in positions if not kinematics.too_near(one)[0].size]
+    hands = np.array([kinematics.directions(one)[2] for one in free])
+    wanted = np.array([directions_of(body, posture, side)[2] for posture in postures])
+    half, most = np.percentile(
+        np.degrees(np.arccos(np.minimum((wanted @ hands.T).max(axis=1), 1.0))), (50, 90)
+    )
+    return f"{half:.1f} / {most:.1f}°"
+
+
 def main(args: list[str] | None = None) -> int:
     """Measure and print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -126,6 +147,9 @@ def main(args: list[str] | None = None) -> int:
         for value in _SPEEDS if given.lag else ("left", "right"):
             if isinstance(value, str):
                 rows.append(row_of(robot, name, value, body, together, given.lowest_m))
+                if given.lowest_m > -10.0:
+                    least = least_of(robot, value, body, together, given.lowest_m)
+                    print(f"least possible from shoulder to hand: {least}")
             else:
                 rows.append(lag_of(robot, name, body, motions, value))
             print(rows[-1], flush=True)

@@ -1,8 +1,9 @@
 """Retargeting of an arm: the directions of upper arm, forearm and hand of the robot and the person.
 
 The three directions, in the frame of the torso, are the same for the robot as for the person, as
-far as its joints allow. Damped least squares find the joint positions, from those before and, where
-these fit badly, from others.
+far as its joints allow. Or only the hand is followed: its place from the shoulder, in lengths of
+the stretched arm, while it stays as upright as it is at rest. Damped least squares find the joint
+positions, from those before and, where these fit badly, from others.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import arm_directions, rotation_x, rotation_y, rotation_z
+from cardbox_tracker.tracking.estimate import CLOSED, OPEN
 
 ARM_JOINTS = ("shoulder_abduction", "shoulder_flexion", "elbow_abduction", "elbow_flexion")
 _STEPS, _LARGEST_STEP, _CLOSE = 12, 0.8, 3e-2
@@ -35,6 +37,8 @@ _BAD, _MUCH_BETTER = 0.07, 0.5
 _STARTS = 8
 # Where a robot cannot have all three directions, its hand is where the person's is.
 _WEIGHTS = (1.0, 1.0, 2.0)
+# A hand that is followed alone rather tilts than is elsewhere.
+_PLACE, _TILT = 2.0, 0.5
 # A point that is too near counts so much for each metre that it comes nearer by millimetres only.
 _KEEPS_OUT = 100.0
 _IDENTITY = np.eye(3)
@@ -46,10 +50,22 @@ _LEAST_PART, _LEAST_SINE = 0.2, 0.5
 
 def directions_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
     """Return unit vectors (3, 3) in the torso frame: upper arm, forearm, shoulder to hand."""
+    return _units(*_limbs(body, posture, side))
+
+
+def hand_of(body: BodyModel, posture: FloatArray, side: str) -> FloatArray:
+    """Return the hand (3,) from its shoulder, torso frame, in lengths of the stretched arm."""
+    upper, fore = _limbs(body, posture, side)
+    reach_m = float(np.linalg.norm(upper) + np.linalg.norm(fore))
+    return np.asarray((upper + fore) / reach_m)
+
+
+def _limbs(body: BodyModel, posture: FloatArray, side: str) -> tuple[FloatArray, FloatArray]:
+    """Return shoulder to elbow and elbow to hand, each (3,), m in the torso frame."""
     sign = 1.0 if side == "left" else -1.0
     upper, fore = arm_directions(posture[LEFT_ARM if side == "left" else RIGHT_ARM], sign)
     parts = body_parts(body.sizes)
-    return _units(parts.upper_arm.height_m * upper, parts.forearm.height_m * fore)
+    return parts.upper_arm.height_m * upper, parts.forearm.height_m * fore
 
 
 def _units(upper: FloatArray, fore: FloatArray) -> FloatArray:
@@ -59,11 +75,12 @@ def _units(upper: FloatArray, fore: FloatArray) -> FloatArray:
 
 
 class _Places(NamedTuple):
-    """Origins (n, 3), m, and axes (n, 3) of the moving joints, and the tip (3,), m."""
+    """Origins (n, 3), m, and axes (n, 3) of the moving joints, tip (3,), m, and turn (3, 3)."""
 
     origins_m: FloatArray
     axes: FloatArray
     tip_m: FloatArray
+    turn: FloatArray  # from the last moving link to the root
 
 
 class _Step(NamedTuple):
@@ -142,7 +159,7 @@ class Kinematics:
                 sine, cosine = math.sin(value), 1.0 - math.cos(value)
                 turn = turn @ (_IDENTITY + sine * step.cross + cosine * step.cross_twice)
         tip = place + turn @ self._tip_m
-        return _Places(np.array(origins), np.array(turns), tip)
+        return _Places(np.array(origins), np.array(turns), tip, turn)
 
     def directions(self, positions: FloatArray) -> FloatArray:
         """Return unit vectors (3, 3) as :func:`directions_of`, in the frame of the root."""
@@ -198,6 +215,25 @@ class Kinematics:
                     moved = sum(self._moved(places, ends[one], one) for one in pair)
                     slopes.append(0.5 * np.array(normal) @ moved)
         return np.array(gaps), np.array(slopes).reshape(-1, count)
+
+    def hand_residual(
+        self, positions: FloatArray, wanted: FloatArray, tilt: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Return how far the hand is off, and what is too near, (6 + k,), and derivatives.
+
+        ``wanted`` (3,) is its place as :func:`hand_of`, and ``tilt`` (3,) the vertical in its axes.
+        """
+        places = self.at(positions)
+        shoulder = places.origins_m[self.shoulder]
+        moved = self._moved(places, places.tip_m, len(places.axes))
+        moved = moved - self._moved(places, shoulder, self.shoulder)
+        x, y, _ = np.where(self._slides[:, None], 0.0, places.axes).T
+        tilted = np.outer(places.turn[1], x) - np.outer(places.turn[0], y)
+        gaps, slopes = self._too_near(places)
+        place = (places.tip_m - shoulder) / self.reach_m - wanted
+        off = (_PLACE * place, _TILT * (places.turn[2] - tilt), _KEEPS_OUT * gaps)
+        changes = (_PLACE / self.reach_m * moved, _TILT * tilted, _KEEPS_OUT * slopes)
+        return np.concatenate(off), np.concatenate(changes)
 
     def residual(self, positions: FloatArray, wanted: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return how far the directions are off, and what is too near, (9 + k,); derivatives."""
@@ -260,7 +296,8 @@ class ArmFollower:
         joints: the arm's joints and the gripper, if there is one.
         mount: rotation matrix (3, 3) from the robot's root to the person's torso.
         turned_deg: the part of its yaw that no setting has, as the robot's shoulders tell it.
-        sources: for each joint, the joints of the person's arm; the hand for the gripper.
+        sources: for each joint, the joints of the person's arm, or the keypoint of the hand that
+            is followed alone; how open the hand is for the gripper.
     """
 
     def __init__(self, robot: Robot, config: RetargetConfig, side: str = "") -> None:
@@ -270,7 +307,9 @@ class ArmFollower:
         self.kinematics = Kinematics(self.arm, config.trunk_radius_m, config.lowest_m)
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
-        behind = tuple(f"{self._side}_{name}" for name in ARM_JOINTS)
+        self._is_hand, self._scale = config.follow == "hand", config.hand_scale
+        followed = ("hand",) if self._is_hand else ARM_JOINTS
+        behind = tuple(f"{self._side}_{name}" for name in followed)
         hand = (f"{self._side}_hand_open",)
         self.sources = (*(behind for _ in self.arm.joints), *(hand for _ in gripper))
         self._lower, self._upper, _ = robot.limits_of(self.joints)
@@ -284,12 +323,18 @@ class ArmFollower:
         angles = np.radians(mount_deg + np.array([0.0, 0.0, self.turned_deg]))
         self.mount = rotation_z(angles[2]) @ rotation_y(angles[1]) @ rotation_x(angles[0])
         self._solution: FloatArray | None = None
+        self._grip: float | None = None
         self._turn = 0
         random = np.random.default_rng(0)
         count = len(self.arm.joints)
         self._low, self._high = self._lower[:count], self._upper[:count]
         # A slide or an arm of several turns has a wide range, of which a turn suffices.
-        rest = np.clip(0.5 * (self._low + self._high), -np.pi, np.pi)
+        # With both sides, the other arm's joints may be named, too.
+        named = tuple(robot.joints) if config.side == "both" else self.arm.joints
+        middle = np.clip(np.mean(robot.limits_of(named)[:2], axis=0), -np.pi, np.pi)
+        at_rest = robot.positions_of("rest", config.rest, named, middle)
+        rest = at_rest[[named.index(name) for name in self.arm.joints]]
+        self._tilt = self.kinematics.at(rest).turn[2]
         limits = {"low": self._low, "high": self._high}
         self._rules = rules_of(
             count, mean=rest, inverse=_REST**2, damping=_DAMPING, largest=_LARGEST_STEP, **limits
@@ -299,7 +344,10 @@ class ArmFollower:
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
-        wanted = directions_of(body, posture, self._side) @ self.mount
+        if self._is_hand:
+            wanted = self._scale * hand_of(body, posture, self._side) @ self.mount
+        else:
+            wanted = directions_of(body, posture, self._side) @ self.mount
         before = now[: len(self.arm.joints)] if self._solution is None else self._solution
         best, error = self._solved(before, wanted)
         if error > _BAD:
@@ -309,8 +357,12 @@ class ArmFollower:
                 best = other
         self._solution = best
         found = np.array([*best, *now[len(best) :]])
-        if self.arm.gripper and np.isfinite(posture[self._hand]):
-            found[-1] = self._closed + float(posture[self._hand]) * (self._open - self._closed)
+        hand = float(posture[self._hand])
+        if self.arm.gripper and np.isfinite(hand):
+            # A hand that is neither open nor closed does not drop what it holds.
+            if hand > OPEN or hand < CLOSED:
+                self._grip = self._open if hand > OPEN else self._closed
+            found[-1] = found[-1] if self._grip is None else self._grip
         return found
 
     def axes(self, positions: FloatArray) -> FloatArray:
@@ -336,12 +388,15 @@ class ArmFollower:
         return found
 
     def _solved(self, start: FloatArray, wanted: FloatArray) -> tuple[FloatArray, float]:
-        """Return joint positions (n,) within the limits and the squared error of directions."""
+        """Return joint positions (n,) within the limits and the squared error of what is wanted."""
 
-        def directions(positions: FloatArray) -> Residuals:
-            off, slopes = self.kinematics.residual(positions[0], wanted)
+        def off(positions: FloatArray) -> Residuals:
+            if self._is_hand:
+                off, slopes = self.kinematics.hand_residual(positions[0], wanted, self._tilt)
+            else:
+                off, slopes = self.kinematics.residual(positions[0], wanted)
             return Residuals(off[None], slopes[None])
 
         start = np.clip(start, self._low, self._high)[None]
-        found = minimize({"directions": directions}, start, self._rules, _STEPS, _CLOSE)
-        return found.values[0], float(found.costs["directions"][0])
+        found = minimize({"off": off}, start, self._rules, _STEPS, _CLOSE)
+        return found.values[0], float(found.costs["off"][0])

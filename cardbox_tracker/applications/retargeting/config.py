@@ -22,6 +22,23 @@ class RetargetConfig(Settings):
     gripper_open: str = setting(
         "upper", "limit of the gripper at which it is open", choices=("lower", "upper")
     )
+    follow: str = setting(
+        "arm",
+        "what is followed. arm: the directions of upper arm, forearm and hand; hand: the hand's "
+        "place from the shoulder, while the robot's hand keeps the tilt that it has at rest",
+        choices=("arm", "hand"),
+    )
+    hand_scale: float = setting(
+        1.0,
+        "if the hand is followed, the robot's is so far from its shoulder for the person's, both "
+        "in lengths of the stretched arm",
+        limits=(0.05, 2.0),
+    )
+    rest: str = setting(
+        "",
+        "positions to which joints of the arm return as far as they are free, JOINT=VALUE,...; "
+        "others: the middle of their range",
+    )
     max_speed: float = setting(
         1.0,
         "no joint of the robot moves faster, nor faster than its URDF says",

@@ -18,7 +18,7 @@ from cardbox_tracker.applications.retargeting.joint_map import (
     with_head_and_hands,
 )
 from cardbox_tracker.applications.retargeting.robot import Robot, load_robot
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import (
     ELBOW_ABDUCTION,
@@ -29,17 +29,22 @@ from cardbox_tracker.person.posture import (
     SHOULDER_FLEXION,
 )
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES
+from cardbox_tracker.person.skeleton import HAND_OPEN_NAMES, JOINT_NAMES, KEYPOINT_NAMES
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN
 
 FOLLOWING = "following"
 # Abduction and flexion of each limb in a posture.
 _ABDUCTIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_ABDUCTION, ELBOW_ABDUCTION]).ravel()
 _FLEXIONS = np.add.outer(FIRST_ANGLES, [SHOULDER_FLEXION, ELBOW_FLEXION]).ravel()
+# The keypoint that tells of each joint of the person: the angles at the shoulder are those of the
+# elbow's place, these of the hand's.
+_ENDS = [
+    f"{name.partition('_')[0]}_{'hand' if '_elbow_' in name else 'elbow'}" for name in JOINT_NAMES
+]
 # Settings that a joint map does not need.
 _OF_AN_ARM = (
     *("base", "hand", "gripper", "gripper_open", "trunk_radius_m", "arms_apart_m", "lowest_m"),
-    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg"),
+    *("mount_roll_deg", "mount_pitch_deg", "mount_yaw_deg", "follow", "hand_scale", "rest"),
 )
 # The first of the speeds with which a robot begins to follow, of its highest.
 _SLOWEST = 0.1
@@ -53,7 +58,7 @@ class Method(Protocol):
 
     @property
     def sources(self) -> tuple[tuple[str, ...], ...]:
-        """For each joint of the robot, what its target depends on: joints of the person, hands."""
+        """For each joint of the robot, what its target depends on: joints or keypoints, hands."""
 
     @property
     def joints(self) -> tuple[str, ...]:
@@ -236,7 +241,7 @@ class Retargeter:
         acceleration = config.max_acceleration or _PER_SECOND * config.max_speed
         self._motion = SafeMotion(
             limits,
-            _start(config.start, method.joints, limits),
+            robot.positions_of("start", config.start, method.joints, 0.0),
             acceleration,
             config.max_jerk or _PER_SECOND * acceleration,
         )
@@ -245,7 +250,9 @@ class Retargeter:
         # (n, 12): whether a joint of the robot follows one of the person.
         sources = method.sources
         self._sources = np.array([[one in names for one in JOINT_NAMES] for names in sources])
-        self._follows = self._sources.any(axis=1)
+        # (n, 6): the same for keypoints, of which the place is followed.
+        self._places = np.array([[one in names for one in KEYPOINT_NAMES] for names in sources])
+        self._follows = self._sources.any(axis=1) | self._places.any(axis=1)
         grips = [not set(HAND_OPEN_NAMES).isdisjoint(names) for names in sources]
         most = np.minimum(config.max_following_error, (limits.upper - limits.lower) / 4)
         self.tolerance = np.where(grips, np.inf, most)
@@ -269,10 +276,13 @@ class Retargeter:
         return self._stop(reason, now_ns)
 
     def hold_near(self, positions: FloatArray, reason: str, now_ns: int) -> Command:
-        """Return the command to stop within the ``tolerance`` of where the robot is, (n,)."""
+        """Return the command to stop within a third of the ``tolerance`` of the robot, (n,).
+
+        So one that presses on something is released, and can be led away from it.
+        """
         held = self.hold(reason, now_ns)
-        point = self._motion.set_point(now_ns)
-        goal = np.clip(point, positions - self.tolerance, positions + self.tolerance)
+        point, near = self._motion.set_point(now_ns), self.tolerance / 3
+        goal = np.clip(point, positions - near, positions + near)
         duration_ns = math.ceil(float((np.abs(goal - point) / self.limits.speed).max()) * 1e9)
         self._motion.move(goal, now_ns, duration_ns)
         return held._replace(positions=goal, duration_s=held.duration_s + duration_ns / 1e9)
@@ -348,7 +358,7 @@ class Retargeter:
         abduction: what follows both angles of a limb needs the direction alone.
         """
         given = np.stack([posture[:N_JOINTS], stddev[:N_JOINTS]])
-        sure = np.isfinite(given).all(axis=0) & self._tracked(keypoints)
+        sure = np.isfinite(given).all(axis=0) & self._tracked(_ENDS, keypoints)
         angles, spread = np.where(sure, given, 0.0)
         bent, shaking = angles[_FLEXIONS], spread[_FLEXIONS]
         # The root of the mean square of the cosine, in which the abduction turns the limb.
@@ -356,39 +366,16 @@ class Retargeter:
         spreads = np.tile(spread, (len(self._sources), 1))
         spreads[:, _ABDUCTIONS] *= np.where(self._sources[:, _FLEXIONS], turned, 1.0)
         is_held = self._sources & ~(sure & (spreads <= self._config.max_stddev_rad))
-        return np.asarray(is_held.any(axis=1))
+        is_lost = self._places & ~self._tracked(KEYPOINT_NAMES, keypoints)
+        return np.asarray(is_held.any(axis=1) | is_lost.any(axis=1))
 
-    def _tracked(self, keypoints: Mapping[str, tuple[str, float]]) -> NDArray[np.bool_]:
-        """Return for which joints of the person (12,) the keypoint is tracked, or not known."""
-        found = []
-        for name in JOINT_NAMES:
-            side, _, joint = name.partition("_")
-            # The angles at the shoulder are those of the elbow's place, these of the hand's.
-            end = "hand" if joint.startswith("elbow") else "elbow"
-            state, chance = keypoints.get(f"{side}_{end}", ("tracked", 0.0))
-            found.append(state == "tracked" and chance <= self._config.max_chance)
-        return np.array(found)
-
-
-def _start(text: str, joints: tuple[str, ...], limits: Limits) -> FloatArray:
-    """Return the positions (n,) of a text ``JOINT=VALUE,...``."""
-    positions = np.clip(np.zeros(len(joints)), limits.lower, limits.upper)
-    for part in filter(None, (part.strip() for part in text.split(","))):
-        name, _, value = part.partition("=")
-        try:
-            number = joints.index(name.strip())
-            positions[number] = float(value)
-        except ValueError:
-            raise CardboxError(
-                f"the start {quoted(part)} is not JOINT=VALUE with one of {', '.join(joints)}"
-            ) from None
-        lower, upper = limits.lower[number], limits.upper[number]
-        if not lower <= positions[number] <= upper:
-            raise CardboxError(
-                f"the start {quoted(part)} is beyond the joint's limits; expected {lower:g} to "
-                f"{upper:g}"
-            )
-    return positions
+    def _tracked(
+        self, names: Sequence[str], keypoints: Mapping[str, tuple[str, float]]
+    ) -> NDArray[np.bool_]:
+        """Return which keypoints (n,) of these names are tracked, or not known."""
+        known = [keypoints.get(name, ("tracked", 0.0)) for name in names]
+        most = self._config.max_chance
+        return np.array([state == "tracked" and chance <= most for state, chance in known])
 
 
 class _Together:

@@ -102,6 +102,33 @@ class Robot:
         lower, upper, speed = rows.reshape(-1, 3).T
         return lower, upper, speed
 
+    def positions_of(
+        self, name: str, text: str, joints: Sequence[str], usual: FloatArray | float
+    ) -> FloatArray:
+        """Return the positions (n,) of a text ``JOINT=VALUE,...``, rad or m, for ``joints``.
+
+        Others are the ``usual`` ones, or the limits nearest to them. Raises CardboxError, which
+        calls the text by its ``name``, for one that is not of these joints or beyond its limits.
+        """
+        limits = np.transpose(self.limits_of(joints)[:2])
+        positions = np.clip(usual, *limits.T)
+        for part in filter(None, (part.strip() for part in text.split(","))):
+            joint, _, value = part.partition("=")
+            try:
+                number = joints.index(joint.strip())
+                positions[number] = float(value)
+            except ValueError:
+                raise CardboxError(
+                    f"the {name} {quoted(part)} is not JOINT=VALUE with one of {', '.join(joints)}"
+                ) from None
+            lower, upper = limits[number]
+            if not lower <= positions[number] <= upper:
+                raise CardboxError(
+                    f"the {name} {quoted(part)} is beyond the joint's limits; expected {lower:g} "
+                    f"to {upper:g}"
+                )
+        return positions
+
     def axis_of(self, joint: Joint) -> FloatArray:
         """Return the axis (3,) of a joint in the frame of the root while all joints are at 0."""
         axis = joint.axis

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import settings as hypothesis_settings
 from hypothesis import strategies as st
 
-from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
+from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of, hand_of
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.retargeter import Retargeter
 from cardbox_tracker.applications.retargeting.robot import load_robot, parse_robot
@@ -92,6 +92,42 @@ def test_the_derivatives_are_those_of_the_directions(positions: list[float]) -> 
         np.testing.assert_allclose((there - off) / 1e-6, slope[:, number], atol=1e-4)
 
 
+@hypothesis_settings(max_examples=15, deadline=None)
+@given(st.lists(st.floats(-1, 1), min_size=7, max_size=7))
+def test_the_derivatives_are_those_of_the_hand(positions: list[float]) -> None:
+    kinematics = ArmFollower(ROBOT, RetargetConfig(trunk_radius_m=0.0, lowest_m=10.0)).kinematics
+    q, zero = np.array(positions), np.zeros(3)
+    off, slope = kinematics.hand_residual(q, zero, zero)
+    for number in range(7):
+        there, _ = kinematics.hand_residual(q + 1e-6 * np.eye(7)[number], zero, zero)
+        np.testing.assert_allclose((there - off) / 1e-6, slope[:, number], atol=1e-4)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.7])
+def test_the_hand_alone_is_followed_upright_whatever_the_elbow_does(scale: float) -> None:
+    rest = "elbow_pitch=-1.6"
+    config = RetargetConfig(follow="hand", hand_scale=scale, rest=rest, trunk_radius_m=0.0)
+    follower = ArmFollower(ROBOT, config)
+    wanted = posture(right_shoulder_abduction=40, right_shoulder_flexion=20, right_elbow_flexion=60)
+    found = np.zeros(7)
+    for _ in range(8):
+        found = follower.target(BODY, wanted, found)
+    places = follower.kinematics.at(found)
+    place = (places.tip_m - places.origins_m[1]) / follower.kinematics.reach_m
+    np.testing.assert_allclose(place, scale * hand_of(BODY, wanted, "right"), atol=0.02)
+    middle = np.mean(ROBOT.limits_of(follower.arm.joints)[:2], axis=0)
+    at_rest = ROBOT.positions_of("rest", rest, follower.arm.joints, middle)
+    tilt = follower.kinematics.at(at_rest).turn[2]
+    assert places.turn[2] @ tilt > np.cos(np.radians(8.0))
+
+
+def test_a_rest_of_another_joint_is_refused() -> None:
+    with pytest.raises(CardboxError, match=r"rest 'jaw=1' is not JOINT=VALUE.*wrist_pitch"):
+        ArmFollower(ROBOT, RetargetConfig(rest="jaw=1"))
+    with pytest.raises(CardboxError, match="rest 'elbow_pitch=9' is beyond"):
+        ArmFollower(ROBOT, RetargetConfig(rest="elbow_pitch=9"))
+
+
 ASIDE = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><link name="d"/>
 <link name="hand"/><joint name="roll" type="continuous"><parent link="a"/><child link="b"/>
 <origin xyz="0 -0.2 0.3"/><axis xyz="1 0 0"/></joint>
@@ -163,14 +199,18 @@ GRIPPER = """<robot name="g"><link name="a"/><link name="b"/><link name="c"/><li
 <limit lower="0" upper="0.04" velocity="1"/></joint></robot>"""
 
 
-@pytest.mark.parametrize(("open_at", "expected"), [("upper", 0.03), ("lower", 0.01)])
-def test_the_gripper_opens_with_the_hand(open_at: str, expected: float) -> None:
+@pytest.mark.parametrize(("open_at", "expected"), [("upper", 0.04), ("lower", 0.0)])
+def test_the_gripper_opens_and_closes_with_the_hand(open_at: str, expected: float) -> None:
     follower = ArmFollower(parse_robot(GRIPPER), RetargetConfig(gripper_open=open_at))
     assert follower.joints == ("pan", "lift", "elbow", "jaw_slide")
     wanted = posture()
     assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == 0.02  # no hand: it stays
-    wanted[15] = 0.75
-    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == pytest.approx(expected)
+    # A hand that is neither leaves the gripper as it is, or on its way.
+    for hand, there in ((0.5, 0.02), (0.8, expected), (0.5, expected), (0.2, 0.04 - expected)):
+        wanted[15] = hand
+        assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == pytest.approx(there)
+    wanted[15] = np.nan
+    assert follower.target(BODY, wanted, np.full(4, 0.02))[3] == 0.02
 
 
 def test_a_mimic_moves_with_its_joint() -> None:

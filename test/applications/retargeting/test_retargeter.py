@@ -11,6 +11,7 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from cardbox_tracker.applications.retargeting.arm import ArmFollower
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
 from cardbox_tracker.applications.retargeting.joint_map import load_joint_map
 from cardbox_tracker.applications.retargeting.retargeter import (
@@ -178,6 +179,23 @@ def test_a_joint_holds_while_its_own_keypoints_are_not_tracked() -> None:
 
 
 @pytest.mark.parametrize(
+    ("elbow", "hand", "moves"),
+    [("uncertain", "tracked", True), ("tracked", "uncertain", False)],
+)
+def test_of_a_hand_that_is_followed_alone_its_keypoint_decides(
+    elbow: str, hand: str, moves: bool
+) -> None:
+    config = RetargetConfig(follow="hand")
+    robot = Retargeter(ROBOT, ArmFollower(ROBOT, config), config)
+    keypoints = {"right_elbow": (elbow, 0.3), "right_hand": (hand, 0.3)}
+    # The elbow may be anywhere about the line from the shoulder to the hand.
+    given = "uncertain", BODY, np.full(12, 0.3), np.full(12, 3.0)
+    for tenth in range(5):
+        command = robot.update(tenth * 10**8, *given, keypoints=keypoints)
+    assert command.is_moving == moves
+
+
+@pytest.mark.parametrize(
     ("state", "deviation", "status"),
     [
         ("lost", 0.1, "holding: lost"),
@@ -263,6 +281,20 @@ def test_two_arms_do_not_touch_and_part_again(tmp_path: Path, apart_m: float) ->
     assert (min(seen) < 0.1) == (apart_m == 0.0)
     assert min(seen) >= apart_m - 0.01
     assert seen[-1] > 0.25
+
+
+def test_the_rest_may_be_of_both_arms(tmp_path: Path) -> None:
+    """The free turn of each straight arm goes to its own rest."""
+    path = two_arms(tmp_path / "two.urdf")
+    rest = "left_wrist_roll=1,right_wrist_roll=-1"
+    _, robot, _ = make_retargeter(path, None, RetargetConfig(side="both", rest=rest))
+    found = np.zeros(len(robot.joints))
+    for _ in range(8):
+        found = robot._method.target(BODY, np.append(np.zeros(12), [np.nan] * 4), found)
+    rolls = [found[robot.joints.index(f"{side}_wrist_roll")] for side in ("left", "right")]
+    assert rolls == pytest.approx([1.0, -1.0], abs=0.05)
+    with pytest.raises(CardboxError, match="'wrist_roll=1' is not JOINT=VALUE"):
+        make_retargeter(path, None, RetargetConfig(side="both", rest="wrist_roll=1"))
 
 
 def test_two_arms_of_one_robot_follow_at_once(tmp_path: Path) -> None:

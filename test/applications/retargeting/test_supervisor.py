@@ -42,10 +42,12 @@ class Bench:
         self.sent: list[tuple[int, np.ndarray]] = []
         self.is_blocked = False
 
-    def posture(self, state: str = "tracking", stamp_step_ns: int = STEP_NS) -> Command | None:
+    def posture(
+        self, state: str = "tracking", stamp_step_ns: int = STEP_NS, posture: str = "arms"
+    ) -> Command | None:
         self.stamp_ns += stamp_step_ns
         seen = state in ("tracking", "uncertain")
-        given = (reference_posture("arms"), np.full(12, 0.1)) if seen else (None, None)
+        given = (reference_posture(posture), np.full(12, 0.1)) if seen else (None, None)
         update = partial(self.retargeter.update, self.stamp_ns, state, BODY, *given)
         return self.supervisor.follow(update, state, self.now_ns)
 
@@ -225,17 +227,21 @@ def steps(bench: Bench, since: int = 0) -> np.ndarray:
 def test_a_blocked_robot_is_held_near_and_does_not_jump_on_release() -> None:
     bench = following()
     bench.is_blocked, sent = True, len(bench.sent)
-    bench.run(500)
-    assert bench.supervisor.status == "holding: shoulder_roll is not where it was sent"
+    statuses = set()
+    for _ in range(500):
+        bench.run(1)
+        statuses.add(bench.supervisor.status)
+    # It is tried again and again, slowly.
+    assert statuses == {"following", "holding: shoulder_roll is not where it was sent"}
     most = bench.config.max_following_error
     off = np.abs([positions - bench.robot for _, positions in bench.sent[sent:]]).max(axis=1)
     # A robot that is at its speed needs half of the time to settle to stop.
     assert off.max() <= most + bench.retargeter.settles_ns / 2e9 * 1.0 + STEP_RAD
-    assert off[-400:].max() <= most + 1e-9
+    # It does not press all the time.
+    assert off[-100:].min() <= most / 2
     bench.is_blocked = False
-    bench.run(3)
+    bench.run(103)
     assert bench.supervisor.status == "following"
-    bench.run(100)
     assert steps(bench).max() <= STEP_RAD
     assert bench.robot[0] < -1.0
 
@@ -248,12 +254,24 @@ def test_a_robot_that_is_moved_elsewhere_is_not_pulled_back() -> None:
     bench.run(200)
     assert steps(bench).max() <= STEP_RAD
     off = np.abs(bench.sent[-1][1] - bench.robot).max()
-    assert off == pytest.approx(bench.config.max_following_error)
-    assert bench.supervisor.phase is Phase.HOLDING
+    assert off <= bench.config.max_following_error + STEP_RAD
     bench.is_blocked = False
     bench.run(20)
     assert bench.supervisor.phase is Phase.FOLLOWING
     assert steps(bench, sent).max() <= STEP_RAD
+
+
+def test_a_robot_that_presses_on_something_is_led_away_from_it() -> None:
+    bench, wall = following(), -0.7
+    for arms in ("arms",) * 200 + ("front",) * 150:
+        bench.step()
+        # The arm stretched aside turns the first joint on against the wall.
+        bench.robot = np.array([max(bench.robot[0], wall), *bench.robot[1:]])
+        bench.posture(posture=arms)
+    # Until then it was held with its command beyond the wall.
+    assert min(positions[0] for _, positions in bench.sent) < wall - 0.1
+    assert bench.supervisor.status == "following"
+    assert bench.robot[0] > wall + 0.2
 
 
 def test_a_gripper_may_be_stopped_by_what_it_holds(tmp_path: Path) -> None:
