@@ -15,6 +15,8 @@ ROS = ["ros-jazzy-rclpy[fastrtps]", "ros-jazzy-common-interfaces"]
 CLUSTER = ["dask>=2024.5", "distributed>=2024.5"]
 # Streams to programs that teleoperate robots.
 TELEOPERATION = ["msgpack>=1,<2", "python-osc>=1.8,<2", "pyzmq>=25,<28"]
+# The robots of lab/tools/pick_and_place.py.
+SIMULATION = ["mujoco>=4,<5"]
 # Gives results in memory as a table.
 PANDAS = ["pandas>=2,<4"]
 TEST = [
@@ -159,6 +161,7 @@ setup(
         "export": EXPORT,
         "cluster": CLUSTER,
         "teleoperation": TELEOPERATION,
+        "simulation": SIMULATION,
     },
     entry_points={"console_scripts": SCRIPTS},
     cmdclass={"install_data": InstallData},
