@@ -33,7 +33,8 @@ EXAMPLES, QUICK_EXAMPLES = 100_000, 300
 # A busy machine takes this for what takes a tenth of a second.
 PATIENCE_S = 60.0
 WORDS_OF_PYTHON = re.compile(
-    r"object (has no attribute|is not|cannot)|NoneType|codec can't|unpack|literal for|unhashable"
+    r"object (has no attribute|is not|cannot)|NoneType|codec can't|literal for|unhashable"
+    r"|(to|cannot) unpack|unpack(_from)? requires"
     r"|(index|indices|argument) (must be|out of range)|convert (string|float)|must be (real|str)"
     r"|unsupported operand|not supported between|broadcast|reshape|inhomogeneous|array element"
     r"|recursion|division by|[Ss]ingular|positional|keyword|too large to convert"
