@@ -267,13 +267,15 @@ def in_scene(
     camera: SceneCamera,
     far: Distances | None = None,
     stature_m: float = USUAL_STATURE_M,
+    moves: bool = False,
 ) -> BodyModel:
-    """Return a body before the camera that was found.
+    """Return a body before the camera that was found, and that ``moves`` or not.
 
     If its own distance is not known, it is the first one of ``far``.
     """
     pitch, height = camera.pitch_rad, camera.height_m
-    body = body.with_values(camera_pitch_rad=pitch.mean, pitch_stddev_rad=pitch.stddev)
+    tilt = {"camera_pitch_rad": pitch.mean, "pitch_stddev_rad": pitch.stddev}
+    body = body.with_values(**tilt, camera_moves=moves)
     if height is not None:
         body = body.with_values(camera_height_m=height.mean, height_stddev_m=height.stddev)
     if far is not None and "distance_m" in body.unknown:
@@ -302,10 +304,8 @@ def camera_moves(people: Sequence[Sightings], pictures: Sequence[Picture], camer
             if abs(seen_s - time_s) < 0.5:
                 _cover(free, points, camera)
         shift = background_shift(before, after, free)
-        if not shift:
-            # Before a bare wall, points of noise were found, or none.
-            by_texture = _texture_shift(before, after, free)
-            shift = shift if by_texture is None else by_texture
+        if shift is None:
+            shift = _texture_shift(before, after, free)
         if shift is not None:
             pairs += 1
             shifted += shift > _SHIFT
@@ -318,7 +318,7 @@ def background_shift(
     """Return how far most of the background has moved in an image, as a share of the longer side.
 
     ``free`` (H, W) is not 0 where no people are in the image ``before``. None if too few points are
-    found again.
+    found again, or points of noise, which would hide a shift.
     """
     # The type of its third point argument lacks None.
     flow: Any = cv2.calcOpticalFlowPyrLK
@@ -337,8 +337,10 @@ def background_shift(
     shift = np.median(shifts, axis=0)
     # Points of noise move, too, but not together.
     spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
-    length = float(np.linalg.norm(shift))
-    return length / max(width, height) if length > 2 * spread else 0.0
+    length, side = float(np.linalg.norm(shift)), max(width, height)
+    if length > 2 * spread:
+        return float(length / side)
+    return 0.0 if 2 * spread <= _SHIFT * side else None
 
 
 def _texture_shift(
