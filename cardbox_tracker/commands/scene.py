@@ -250,8 +250,8 @@ def _bodies(
     """Yield the bodies with what was found of the camera and of the first person's distance."""
     far = _longest(found) if person.people is None else None
     for body in bodies:
-        body = in_scene(body, found.camera, far, person.stature_m or USUAL_STATURE_M)
-        body = body.with_values(camera_moves=found.moves)
+        stature_m = person.stature_m or USUAL_STATURE_M
+        body = in_scene(body, found.camera, far, stature_m, found.moves)
         if person.stature_m is None and person.model is None:
             body = body.with_values(stature_stddev=USUAL_STDDEV_M / USUAL_STATURE_M)
         yield body

@@ -223,7 +223,7 @@ def _add(values: Floats, jacobian: Floats, number: int, found: Equations) -> Non
     _, information, right, costs = found
     size = right.shape[1]
     # Of many unknowns, a residual depends on few.
-    known, count = np.empty(size, np.int64), 0
+    known = np.empty(size, np.int64)
     for n in range(values.shape[0]):
         for r in range(values.shape[1]):
             costs[n, number] += values[n, r] ** 2

@@ -138,7 +138,8 @@ class PoseProblem:
         """Return the distances of body and silhouette in both cameras."""
         here, *beside = map(self._drawer, self._poses(values))
         states = values[0, N_POSE:].reshape(-1, N_STATE)
-        ends = np.cumsum([len(one.distances) + len(two.distances) for one, two in self._seen])
+        counts = [len(one.distances) + len(two.distances) for one, two in self._seen]
+        ends = np.cumsum([0, *counts])
         errors, slopes, costs = np.empty(ends[-1]), np.zeros((ends[-1], values.size)), np.zeros(1)
         for number, (state, (first, other)) in enumerate(zip(states, self._seen, strict=True)):
             steps = np.vstack([np.zeros(N_STATE), np.diag(STATE_STEP), -np.diag(STATE_STEP)])
@@ -147,14 +148,15 @@ class PoseProblem:
                 for one in state + steps
             ]
             there = np.array([other.drawn(drawer(state)) for drawer in beside])
-            by_pose = np.zeros((len(moved[0]), N_POSE))
-            by_pose[len(first.distances) :] = _slopes(there, _POSE_STEP)
-            slope = np.hstack([by_pose, _slopes(np.array(moved[1:]), STATE_STEP)])
+            slope = np.zeros((len(moved[0]), N_POSE + N_STATE))
+            slope[len(first.distances) :, :N_POSE] = _slopes(there, _POSE_STEP)
+            slope[:, N_POSE:] = _slopes(np.array(moved[1:]), STATE_STEP)
             error = moved[0] - np.append(first.distances, other.distances)
+            # Of the many unknowns, a sighting depends on the pose and its own state.
             robust = geman_mcclure(error[None], slope[None], HALF_PX, _POINT_PX)
-            rows, own = slice(ends[number] - len(error), ends[number]), N_POSE + number * N_STATE
-            errors[rows], slopes[rows, :N_POSE] = robust.values[0], robust.jacobian[0, :, :N_POSE]
-            slopes[rows, own : own + N_STATE] = robust.jacobian[0, :, N_POSE:]
+            rows, own = slice(*ends[number : number + 2]), np.arange(N_POSE + N_STATE)
+            own[N_POSE:] += number * N_STATE
+            errors[rows], slopes[rows, own] = robust.values[0], robust.jacobian[0]
             assert robust.costs is not None
             costs += robust.costs
         return Residuals(errors[None], slopes[None], costs)

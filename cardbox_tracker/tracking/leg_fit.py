@@ -89,15 +89,23 @@ def points_of(values: Floats, of: Person) -> Floats:
     return points_m
 
 
+@kernel
+def _middle_m(hip: float, knee: float, ankle: float, upper_m: float) -> float:
+    """Return how far the middle of the mass is ahead of an ankle, m, by coordinates along a line.
+
+    ``upper_m`` is how far that of trunk, head and arms is ahead of the hip.
+    """
+    middle_m = _UPPER * (hip + upper_m) + _THIGHS * (hip + _ALONG * (knee - hip))
+    return middle_m + _SHANKS * (knee + _ALONG * (ankle - knee)) + (_FEET - 1.0) * ankle
+
+
 def balanced_m(points_m: Floats, facing: Floats) -> float:
     """Return how far the mass of trunk, head and arms of who stands is ahead of the hips, m.
 
     ``points_m`` (6, 3) are hips, knees and ankles, and ``facing`` (3,) is where the person faces.
     """
-    hip, knee, ankle = np.mean(points_m.reshape(2, 3, 3), axis=0) @ facing
-    legs_m = _THIGHS * (hip + _ALONG * (knee - hip)) + _SHANKS * (knee + _ALONG * (ankle - knee))
-    legs_m += _UPPER * hip + (_FEET - 1.0) * ankle
-    return float((_AHEAD_M - legs_m) / _UPPER)
+    hip, knee, ankle = (np.mean(points_m.reshape(2, 3, 3), axis=0) @ facing).tolist()
+    return (_AHEAD_M - _middle_m(hip, knee, ankle, 0.0)) / _UPPER
 
 
 @borrowing_kernel
@@ -139,8 +147,7 @@ def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: 
     middle_m = 0.0
     for leg in range(2):
         hip, knee, ankle = points_m[3 * leg, 0], points_m[3 * leg + 1, 0], points_m[3 * leg + 2, 0]
-        middle_m += _UPPER * (hip + upper_m) + _THIGHS * (hip + _ALONG * (knee - hip))
-        middle_m += _SHANKS * (knee + _ALONG * (ankle - knee)) + (_FEET - 1.0) * ankle
+        middle_m += _middle_m(hip, knee, ankle, upper_m)
     residuals[at + 4] = (middle_m / 2 - _AHEAD_M * of[2][0, 0]) / sigma_m
     total = 0.0
     for i in range(_N_RESIDUALS):

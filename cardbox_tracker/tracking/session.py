@@ -388,9 +388,8 @@ class Session:
         found = self._scene.see(self._last_ns / 1e9, points, seen.image)
         if found is None:
             return
-        guesses = [in_scene(body, found.camera) for body in self._bodies]
-        guesses = [body.with_values(camera_moves=found.moves) for body in guesses]
-        self.tilt(guesses, self._last_ns)
+        bodies = (in_scene(body, found.camera, moves=found.moves) for body in self._bodies)
+        self.tilt([*bodies], self._last_ns)
         for person, far in zip(self._people, found.distances, strict=False):
             stature_m = self._scene.stature_m(person.number)
             there = far and far._replace(distances=far.distances * stature_m)

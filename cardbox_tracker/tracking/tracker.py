@@ -281,7 +281,7 @@ class Tracker:
     def _doubted(self, estimate: Estimate, reason: str) -> Estimate:
         """Return an estimate that is no surer than body, distance, person and limits."""
         place, camera = estimate.place, self.body.camera_pose
-        wrong = camera.contradiction or "the camera moves" * camera.moves
+        wrong = camera.contradiction or ("the camera moves" if camera.moves else "")
         if self.faults.is_contradicted:
             wrong = wrong or reason
         if place is not None and wrong:

@@ -3,7 +3,7 @@
 python -m lab.tools.pick_and_place --output docs/evaluation/pick-and-place.md
 
 A scripted person of the renderer reaches for a cube, closes the hand, carries the cube and opens
-the hand. Images of one camera go through the chain: silhouettes of the learned background, a
+the hand. Images of two cameras go through the chain: silhouettes of the learned background, a
 detector's points, tracker, retargeting, supervisor with its limits, and position actuators in
 MuJoCo. The person sees the gripper, late, and moves the hand by a share of what it is off. Beside
 the whole chain, one part at a time is replaced: by the truth, or by what there is without it.

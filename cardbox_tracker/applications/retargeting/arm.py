@@ -357,12 +357,12 @@ class ArmFollower:
                 best = other
         self._solution = best
         found = np.array([*best, *now[len(best) :]])
-        hand = float(posture[self._hand])
-        if self.arm.gripper and np.isfinite(hand):
+        if self.arm.gripper and np.isfinite(hand := float(posture[self._hand])):
             # A hand that is neither open nor closed does not drop what it holds.
             if hand > OPEN or hand < CLOSED:
                 self._grip = self._open if hand > OPEN else self._closed
-            found[-1] = found[-1] if self._grip is None else self._grip
+            if self._grip is not None:
+                found[-1] = self._grip
         return found
 
     def axes(self, positions: FloatArray) -> FloatArray:
