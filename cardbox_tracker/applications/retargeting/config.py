@@ -30,8 +30,8 @@ class RetargetConfig(Settings):
     )
     hand_scale: float = setting(
         1.0,
-        "if the hand is followed, the robot's is so far from its shoulder for the person's, both "
-        "in lengths of the stretched arm",
+        "with follow hand: reach of the robot's hand from its shoulder divided by that of the "
+        "person's, both in lengths of the stretched arm",
         limits=(0.05, 2.0),
     )
     rest: str = setting(
