@@ -30,6 +30,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import (
     Watched,
+    lens_in,
     seen_people,
     seen_person,
     turns_in,
@@ -79,9 +80,18 @@ def measured_scene(
             return
         choice = person.choice
         watched = watch(source, *span, choice)
-        background = None
+        background = lens = None
         if recording.shows_turns:
             moves = camera_moves(watched.people, watched.pictures, first.camera)
+            if moves and lens_of(first.camera).origin == USUAL:
+                lens = lens_in(source, *span)
+            if lens is not None:
+                stack.close()
+                seeing = recording.camera.seeing(lens.mean, lens.stddev)
+                recording = replace(recording, camera=seeing)
+                source = stack.enter_context(recording.open())
+                first = source.first
+                print_remarks([_found_lens(lens)])
             turns = turns_in(source, watched, *span) if moves else None
             background = Background(moves)
             if turns is not None:
@@ -93,6 +103,8 @@ def measured_scene(
                 background = Background(edges=turns[1])
                 print_remarks([turns[0].remark])
         found = found_camera(recording, person, watched, first.camera, background)
+        if lens is not None:
+            found = found._replace(camera=found.camera._replace(fov_rad=lens))
         better = _corrected(recording, found.camera)
         if better is not recording:
             stack.close()
@@ -329,12 +341,16 @@ def found_camera(
             "are"
         )
     if better.camera.fov_deg != recording.camera.fov_deg:
-        remarks.append(
-            f"field of view {better.camera.fov_deg:.0f} degrees across the image, found from "
-            f"{found.camera.fov_rad.by}; give --fov if it is known"
-        )
+        remarks.append(_found_lens(found.camera.fov_rad))
     print_remarks(remarks)
     return found
+
+
+def _found_lens(fov_rad: Value) -> str:
+    return (
+        f"field of view {math.degrees(fov_rad.mean):.0f} degrees across the image, found from "
+        f"{fov_rad.by}; give --fov if it is known"
+    )
 
 
 def tilt_in(

@@ -5,17 +5,22 @@ there. Each image is turned until its brightness at all of them is the same (dir
 one rotation: Lucas and Kanade, "An iterative image registration technique", 1981; from blurred
 images to sharp ones, each pixel with Cauchy's robust weight). Since all images are compared with
 the same directions, errors do not add up. A camera that leaves its place shows parallax: then too
-few edges agree on one rotation, and it is unknown.
+few edges agree on one rotation, and it is unknown. With another focal length than the camera's,
+images that are turned back are stretched, so the turns show it, too (self-calibration of a rotating
+camera: Hartley, "Self-calibration of stationary cameras", 1997).
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from math import exp, hypot
 from typing import NamedTuple
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import brightness_of
@@ -47,6 +52,12 @@ _NOISE, _LEAST_AHEAD = 2.0, 0.1
 _SHOWN, _SOUGHT = 1, 2
 # Share of images without a rotation from which on the camera is not followed.
 _MOST_UNKNOWN = 0.2
+# Focal lengths that are tried, in those of the camera; tolerance of their logarithm. Each is rated
+# by the mean distance of the edges, in _AGREES and at most this number of it.
+_LENSES, _TOLERANCE, _FAR = 0.6 * 1.35 ** np.arange(6), 0.02, 3.0
+# Relative deviation of a focal length: a camera that is held in hands turns about an elbow, half a
+# metre behind it, so what is 4 m away seems to turn by an eighth more.
+_HELD = 0.06
 
 
 class CameraTurns(NamedTuple):
@@ -74,18 +85,49 @@ def follow_turns(frames: Iterable[tuple[int, Image, Image]], camera: Camera) -> 
             in it, in order.
         camera: intrinsics of the images.
     """
-    room, rotations, unknown = _Map(camera), dict[int, FloatArray](), 0
+    room, rotations = _Map(camera), dict[int, FloatArray]()
     for stamp_ns, image, silhouette in frames:
         turn = room.place(image, silhouette)
-        if turn is None:
-            unknown += 1
-        else:
+        if turn is not None:
             rotations[stamp_ns] = turn
-    if not rotations or unknown > _MOST_UNKNOWN * (unknown + len(rotations)):
+    if room.is_lost:
         return None
     left, top, right, bottom = room.shown
     corner = left - room.origin[0], top - room.origin[1]
-    return CameraTurns(rotations, unknown, room.pixels[top:bottom, left:right], corner)
+    return CameraTurns(rotations, room.unknown, room.pixels[top:bottom, left:right], corner)
+
+
+def turning_lens(
+    frames: Sequence[tuple[Image, Image]], camera: Camera
+) -> tuple[float, float] | None:
+    """Return the focal length by how the background turns, and its relative deviation, or None.
+
+    The length is in those of the ``camera``. ``frames`` are images and silhouettes of
+    :func:`follow_turns`. None if other lenses fit as well, or edges agree on no rotation.
+    """
+
+    def seen(log_length: float) -> _Map:
+        lens = exp(log_length)
+        room = _Map(replace(camera, fx=lens * camera.fx, fy=lens * camera.fy))
+        for one in frames:
+            room.place(*one)
+        return room
+
+    tried = np.log(_LENSES)
+    misfits = [seen(one).misfit for one in tried.tolist()]
+    best = int(np.argmin(misfits))
+    if best in (0, len(tried) - 1) or misfits[best] > 1.0:
+        return None
+    ends = [best - 1, best + 1]
+    given = {"bounds": tuple(tried[ends]), "options": {"xatol": _TOLERANCE}}
+    peak = float(minimize_scalar(lambda one: seen(one).misfit, method="bounded", **given).x)
+    room = seen(peak)
+    rise = np.take(misfits, ends) / room.misfit - 1.0
+    if room.is_lost or rise.min() <= 0.0:
+        return None
+    # Edges that are near to each other err together, and so do those of all images.
+    stddev = np.mean(np.abs(tried[ends] - peak) / np.sqrt(rise * room.edges / _TOGETHER))
+    return exp(peak), hypot(_HELD, stddev)
 
 
 class _Map:
@@ -95,6 +137,8 @@ class _Map:
         pixels: of the background, (H, W) or (H, W, 3); 0 where nothing was seen.
         origin: column and row of the first image's first pixel.
         shown: left, top, right and bottom of what images have shown so far.
+        edges: the largest number of edges that were compared with an image.
+        unknown: number of images without a rotation.
     """
 
     def __init__(self, camera: Camera) -> None:
@@ -109,11 +153,23 @@ class _Map:
         self._seen = np.zeros((2 * down, 2 * across), np.uint8)
         self.pixels = self._seen
         self.shown: Box = (*self.origin, *self.origin)
+        self.edges = self.unknown = self._images = 0
+        self._misfits = list[float]()
         # From the frame of the last image into that of the first one.
         self._back = np.eye(3)
         # Edges: directions, brightness with each blur, slopes with the last one.
         self._rays, self._slopes = np.zeros((0, 3)), np.zeros(0)
         self._values = np.zeros((len(_BLURS), 0))
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether too few images, or none, have a rotation."""
+        return not self._images or self.unknown > _MOST_UNKNOWN * self._images
+
+    @property
+    def misfit(self) -> float:
+        """Mean distance of the edges from where they are with the rotations, in ``_AGREES``."""
+        return float(np.mean(self._misfits)) if self._misfits else _FAR
 
     def place(self, image: Image, silhouette: Image) -> FloatArray | None:
         """Return the rotation (3, 3) into an image, which continues the map; None if unknown."""
@@ -127,7 +183,9 @@ class _Map:
         is_first = self.pixels is self._seen
         back: FloatArray | None = self._back if is_first else self._placed(levels, inside)
         box = None if back is None else self._box(back)
+        self._images += 1
         if back is None or box is None:
+            self.unknown += 1
             return None
         self._back = back
         begin, end = np.minimum(self.shown[:2], box[:2]), np.maximum(self.shown[2:], box[2:])
@@ -211,7 +269,10 @@ class _Map:
                 gain, bias = gain + step[3], bias + step[4]
                 if np.linalg.norm(step[:3]) < _SMALL:
                     break
-        agree = np.abs(away) < near_px * self._slopes[counts]
+        off = np.abs(away) / (near_px * self._slopes[counts])
+        self._misfits.append(float(np.minimum(off, _FAR).mean()))
+        self.edges = max(self.edges, len(off))
+        agree = off < 1.0
         # Edges tell how they move across themselves, in px.
         normals = turning[:, agree] / np.maximum(self._slopes[counts][agree], 1e-9)
         tell = normals @ normals.T / _TOGETHER / near_px**2

@@ -16,11 +16,12 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
-from cardbox_tracker.measuring.camera_turns import follow_turns
+from cardbox_tracker.measuring.camera_turns import follow_turns, turning_lens
 from cardbox_tracker.measuring.first_sight import upper_body
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.room_edges import edge_likelihoods
-from cardbox_tracker.measuring.scene_camera import Picture
+from cardbox_tracker.measuring.scene import FOUND, Value
+from cardbox_tracker.measuring.scene_camera import Picture, lens_of
 from cardbox_tracker.measuring.scene_watch import MOST_PICTURES, Spread
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
 from cardbox_tracker.person.model import BodyModel
@@ -31,6 +32,9 @@ from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.turned_back import Turned
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.tracking.session import Session
+
+# Most images by which the lens of a camera that turns is found.
+_MOST_TURNED = 40
 
 
 class Watched(NamedTuple):
@@ -117,6 +121,17 @@ class _Shot:
     )
 
 
+def lens_in(recording: Recording, start_s: float = 0.0, end_s: float = math.inf) -> Value | None:
+    """Return the field of view, rad, by how the camera of a recording turns, if that shows it."""
+    frames = Spread[tuple[NDArray[np.uint8], NDArray[np.uint8]]](_MOST_TURNED)
+    for taken in recording.frames(start_s, end_s):
+        frames.add(partial(_shown, taken.first))
+    found = turning_lens(frames.items, recording.first.camera)
+    if found is None:
+        return None
+    return lens_of(recording.first.camera, Value(*found, FOUND, "the turns of the camera"))
+
+
 def turns_in(
     recording: Recording, watched: Watched, start_s: float = 0.0, end_s: float = math.inf
 ) -> tuple[Turned, FloatArray] | None:
@@ -140,6 +155,10 @@ def turns_in(
     known = [(turn, one) for turn, one in turns if turn is not None]
     edges = edge_likelihoods([one for _, one in known], camera, [turn for turn, _ in known])
     return Turned(found, (camera.width, camera.height), lens), edges
+
+
+def _shown(frame: RecordedFrame) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
+    return frame.image, frame.silhouette
 
 
 def _whole(frame: RecordedFrame) -> RecordedFrame | None:

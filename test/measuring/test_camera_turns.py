@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import cv2
 import numpy as np
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import angle_of
-from cardbox_tracker.measuring.camera_turns import CameraTurns, follow_turns
+from cardbox_tracker.measuring.camera_turns import CameraTurns, follow_turns, turning_lens
 
 FloatArray = NDArray[np.float64]
 
@@ -70,6 +71,26 @@ def test_the_rotation_of_each_image_is_found(motion: str) -> None:
     away = [angle_of(found.rotations[number] @ turn.T) for number, turn in enumerate(turns)]
     assert np.degrees(max(away)) < 0.05
     assert found.largest_rad == pytest.approx(max(map(angle_of, turns)), abs=1e-3)
+
+
+@pytest.mark.parametrize(("motion", "guessed"), [("shake", 1.4), ("pan", 0.6), ("pan", 1.0)])
+def test_the_turns_show_the_lens(motion: str, guessed: float) -> None:
+    turns = [turned(MOTIONS[motion](time_s)) for time_s in TIMES_S[::2]]
+    frames = [(image, person) for _, image, person in film(wall(), views(turns))]
+    other = replace(CAMERA, fx=guessed * CAMERA.fx, fy=guessed * CAMERA.fy)
+    found = turning_lens(frames, other)
+    assert found is not None
+    assert guessed * found[0] == pytest.approx(1.0, abs=0.03)
+    assert 0.06 <= found[1] < 0.1
+
+
+def test_a_camera_that_stands_or_leaves_its_place_shows_no_lens() -> None:
+    straight = views([np.eye(3)] * 12)
+    aside = [np.array([(1.0, 0.0, -4.0 * k), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]) for k in range(12)]
+    moved = [shift @ view for shift, view in zip(aside, straight, strict=True)]
+    for matrices in (straight, moved):
+        frames = [(image, person) for _, image, person in film(wall(), matrices)]
+        assert turning_lens(frames, CAMERA) is None
 
 
 def test_the_background_continues_the_first_image_without_the_person() -> None:

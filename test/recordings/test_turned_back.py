@@ -19,6 +19,7 @@ from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
+from cardbox_tracker.measuring.scene import FOUND
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.measured_scene import Watched, turns_in, watch
@@ -178,6 +179,23 @@ def test_the_place_is_of_the_first_image_also_if_turned_images_are_read_again(
         assert chosen is not None
     as_recorded, turned, again = choices
     assert as_recorded == choice != turned == again
+
+
+def test_the_turns_show_a_field_of_view_that_is_not_given(
+    shaken: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    person = PersonRequest(BodyModel(), None, 0.0, is_pitch_given=True)
+    asked = replace(request(shaken), camera=GivenCamera(fps=10.0))
+    with asked.open() as source:
+        assert source.first.camera.fx < 0.91 * CAMERA.fx
+    with scene.measured_scene(asked, person, TrackerConfig(), 0) as (source, found, _):
+        assert source.first.camera.fx == pytest.approx(CAMERA.fx, rel=0.03)
+        fov_rad = found.camera.fov_rad
+    assert np.degrees(fov_rad.mean) == pytest.approx(FOV_DEG, rel=0.03)
+    assert (fov_rad.origin, fov_rad.by) == (FOUND, "the turns of the camera")
+    assert fov_rad.stddev / np.sin(fov_rad.mean) == pytest.approx(0.07, abs=0.02)
+    said = capsys.readouterr().err
+    assert "degrees across the image, found from the turns of the camera" in said
 
 
 def test_a_table_of_points_says_nothing_of_a_camera_that_moves(shaken: Path) -> None:
