@@ -241,7 +241,8 @@ class PoseDirection:
             (Verdict("upside down", _explained), pencil, 2, 0),
         ]
         self._frames = 0
-        self._wrong, self.joints = Verdict("contradicted"), Verdict("joints")
+        self._wrong, self.height = Verdict("contradicted"), Verdict("height")
+        self.joints = Verdict("joints")
 
     @property
     def fault(self) -> Verdict | None:
@@ -251,9 +252,10 @@ class PoseDirection:
         return best if best.holds else None
 
     @property
-    def height_deg(self) -> float:
-        """Median angle between both cameras' tangent planes, degrees; 0 while unknown."""
-        return self._wrong.value
+    def is_suspected(self) -> bool:
+        """Whether too few samples for a verdict show any of the errors."""
+        supposed = (one for one, *_ in self._supposed)
+        return any(one.is_suspected for one in (self.height, self.joints, *supposed))
 
     def see(
         self,
@@ -279,6 +281,7 @@ class PoseDirection:
         given = abs(np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given)))
         if np.isfinite(given):
             self._wrong.see(given)
+            self.height.see(given)
         for verdict, pencil, here, there in self._supposed:
             supposed = abs(np.degrees(_height_of(hulls[0][here], hulls[1][there], pencil)))
             if np.isfinite(given) or np.isfinite(supposed):

@@ -120,7 +120,7 @@ def contradicted(measures: Sequence[float]) -> Told:
         lower = round(300.0 * np.tan(np.radians(degrees)))
         for _ in range(15 * 6):
             direction.see(person(top), person(top + lower))
-        assert direction.height_deg == pytest.approx(degrees, abs=0.15)
+        assert direction.height.value == pytest.approx(degrees, abs=0.15)
         yield direction.fault is not None
 
 
@@ -146,9 +146,9 @@ def joints(measures: Sequence[float]) -> Told:
         yield direction.joints.holds
 
 
-def compared(source: str) -> CameraAgreement:
+def compared(source: str, pose: Extrinsics = BESIDE) -> CameraAgreement:
     body = BodyModel.of(source=source) if source else BodyModel()
-    view = View.of(body, CAMERA, OtherCamera(CAMERA, BESIDE))
+    view = View.of(body, CAMERA, OtherCamera(CAMERA, pose))
     return CameraAgreement(body, CAMERA, [view])
 
 
@@ -168,6 +168,20 @@ def height(measures: Sequence[float]) -> Told:
         for _ in range(15 * 6):
             agreement.look([Frame(CAMERA, channels, 240, 1) for channels in pair])
         yield agreement.remarks(["cam1"]) != []
+
+
+def aside(measures: Sequence[float]) -> Told:
+    """A camera 10 cm to the right shows the person aside of where a farther one would be."""
+    agreement = compared(PROPORTIONS, Extrinsics(np.eye(3), np.array([-0.1, 0.0, 0.0])))
+    farthest = np.arctan(0.1 / (1.15 * BodyModel().placement.distance_m))
+    for degrees in measures:
+        shift = round(300.0 * np.tan(farthest - np.radians(degrees)))
+        pair = [{"silhouette": np.roll(person(), -px, axis=1)} for px in (0, shift)]
+        frames = [Frame(CAMERA, channels, 240, 1) for channels in pair]
+        for _ in range(15):
+            agreement.see(np.zeros(14), frames)
+            agreement.look(frames)
+        yield agreement.are_contradicted == [True]
 
 
 def other_view(measures: Sequence[float]) -> Told:
@@ -520,6 +534,7 @@ CASES = [
     Case("height", 0.8, 1.3, height),
     Case("joints", 1.6, 1.7, joints),
     Case("unit", 0.25, 0.35, of_extrinsics("unit")),
+    Case("aside", 0.4, 0.8, aside, ending=0.2),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
     Case("distance", 1.85, 2.05, distance, lasting=1.1, ending=0.9),
