@@ -21,7 +21,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.common.least_squares import Residuals, geman_mcclure
-from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
+from cardbox_tracker.detectors.image_points import CERTAIN, POINT_NAMES, ImagePoints
+from cardbox_tracker.measuring.motion_lag import MotionLag
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -242,7 +243,7 @@ class PoseDirection:
         ]
         self._frames = 0
         self._wrong, self.height = Verdict("contradicted"), Verdict("height")
-        self.joints = Verdict("joints")
+        self.joints, self.lag = Verdict("joints"), MotionLag()
 
     @property
     def fault(self) -> Verdict | None:
@@ -262,22 +263,32 @@ class PoseDirection:
         first: Silhouette,
         other: Silhouette,
         points: tuple[ImagePoints | None, ImagePoints | None] = (None, None),
+        stamp_ns: int | None = None,
     ) -> None:
         """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not.
 
-        ``points`` are those of a detector in both images.
+        ``points`` are those of a detector in both images. Without a stamp, no lag is looked for.
         """
-        self._see_joints(*points)
+        heights = self._see_joints(*points), self._see_silhouettes(first, other)
+        if stamp_ns is not None:
+            self.lag.add(stamp_ns, *np.hstack(heights))
+
+    def _see_silhouettes(self, first: Silhouette, other: Silhouette) -> FloatArray:
+        """Return the height of the top in both cameras, (2, 1), rad; nan where it is unknown."""
+        tops = np.full((2, 1), np.nan)
         self._frames += 1
         if self._frames > _FIRST and self._frames % _EVERY:
-            return
+            return tops
         hulls = [
             [_hull_of(px, camera, flip) for flip in flips]
             for mask, camera, flips in zip((first, other), self._cameras, self._flips, strict=True)
             if len(px := _outline(mask))
         ]
         if len(hulls) < len(self._cameras):
-            return
+            return tops
+        for number, ((hull, *_), axes) in enumerate(zip(hulls, self._given[1:], strict=True)):
+            ray, is_whole = _highest(hull, axes)
+            tops[number] = np.arctan2(*(axes @ ray)) if is_whole else np.nan
         given = abs(np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given)))
         if np.isfinite(given):
             self._wrong.see(given)
@@ -287,20 +298,21 @@ class PoseDirection:
             if np.isfinite(given) or np.isfinite(supposed):
                 # A supposed fault is none if it does not even show the top, as is the given pose.
                 verdict.see(*(float(np.nan_to_num(one, nan=np.inf)) for one in (given, supposed)))
+        return tops
 
-    def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> None:
+    def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> FloatArray:
+        """Return heights of the joints that both show, (2, n), rad; nan for others."""
+        angles = np.full((2, len(POINT_NAMES)), np.nan)
         if one is None or other is None:
-            return
+            return angles
         known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
-        if np.count_nonzero(known) < _LEAST_POINTS:
-            return
-        angles = [
-            np.arctan2(*(axes @ camera.rays(points.px[known]).T))
-            for axes, camera, points in zip(
-                self._given[1:], self._cameras, (one, other), strict=True
-            )
-        ]
-        self.joints.see(float(np.degrees(np.median(np.abs(angles[0] - angles[1])))))
+        pairs = zip(self._given[1:], self._cameras, (one, other), strict=True)
+        for number, (axes, camera, points) in enumerate(pairs):
+            angles[number, known] = np.arctan2(*(axes @ camera.rays(points.px[known]).T))
+        if np.count_nonzero(known) >= _LEAST_POINTS:
+            apart = np.abs(angles[0, known] - angles[1, known])
+            self.joints.see(float(np.degrees(np.median(apart))))
+        return angles
 
 
 def _explained(given: float, supposed: float) -> float:

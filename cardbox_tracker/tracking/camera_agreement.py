@@ -95,6 +95,7 @@ class _Compared:
         else:
             yield self.direction.height.remark(name=name)
         yield self.direction.joints.remark(name=name)
+        yield self.direction.lag.remark(name)
         yield self.rolled.remark(name=name, shown=_shown(self.rolled.value))
 
     def look(self, first: Frame, other: Frame, distance_m: float | None) -> None:
@@ -103,14 +104,15 @@ class _Compared:
         Of a narrow pair, whose silhouettes have the same middle, the angle between both lines of
         sight shows the distance, which is ``distance_m`` by the size, if that is known.
         """
-        self.direction.see(first.silhouette, other.silhouette, (first.points, other.points))
+        points = first.points, other.points
+        self.direction.see(first.silhouette, other.silhouette, points, first.stamp_ns)
         columns = middle(first.silhouette), middle(other.silhouette)
         if columns[0] is None or columns[1] is None:
             return
         here = (columns[0] - first.camera.cx) / first.camera.fx
         there = (columns[1] - other.camera.cx) / other.camera.fx
         at, ahead = map(np.array, self.view.line_of_sight(there))
-        before = np.array([-1.0, -here])
+        before = np.array([-1.0, here])
 
         def angle(line: FloatArray, away_m: float) -> float:
             to = away_m * before - at
@@ -119,7 +121,8 @@ class _Compared:
         if abs(angle(before, distance_m or self._distance_m)) < _NARROW_DEG:
             range_m = _SEEN_M if distance_m is None else distance_m * _SIZES
             off = np.array([angle(ahead, away_m) for away_m in range_m])
-            self.aside.see(0.0 if off.prod() <= 0.0 else np.abs(off).min())
+            across = 0.0 if off.prod() <= 0.0 else np.abs(off).min()
+            self.aside.see(max(across, self.direction.height.value))
 
     def place(self, state: FloatArray, column: float) -> None:
         """Compare how far the person is by their size and by both cameras' lines of sight.

@@ -132,9 +132,7 @@ def test_a_format_that_fails_leaves_the_old_file(
     assert list(path.parent.iterdir()) == [path]
 
 
-def test_a_format_cannot_change_what_others_write(
-    add: Callable[..., None], tmp_path: Path
-) -> None:
+def test_a_format_cannot_change_what_others_write(add: Callable[..., None], tmp_path: Path) -> None:
     (tmp_path / "beside.py").write_text(
         MODULE.replace("path.write_text", "motion.states[:] = 7; path.write_text")
     )
