@@ -52,7 +52,8 @@ class MotionLag:
         _, first, other = zip(*seen, strict=True)
         period_ns = span_ns / (len(seen) - 1)
         lag = lag_of(np.array(first), np.array(other), round(_MOST_NS / period_ns))
-        self.verdict.see(lag * period_ns / 1e9 if abs(lag) > 1 else 0.0)
+        if lag is not None:
+            self.verdict.see(lag * period_ns / 1e9 if abs(lag) > 1 else 0.0)
 
     def remark(self, name: str) -> str:
         """Return a warning that a camera of this name is late or early; empty if it is not."""
@@ -60,12 +61,12 @@ class MotionLag:
         return self.verdict.remark(name=name, than="later" if is_late else "earlier")
 
 
-def lag_of(here: FloatArray, there: FloatArray, most: int) -> int:
-    """Return by how many images the second series (N, n) is late; 0 if nothing shows a lag."""
+def lag_of(here: FloatArray, there: FloatArray, most: int) -> int | None:
+    """Return by how many images the second series (N, n) is late; None if no motion shows it."""
     alike = {lag: _correlation(here, there, lag) for lag in range(-most, most + 1)}
     best = max(alike, key=lambda lag: alike[lag])
-    is_clear = alike[best] > max(_LEAST, alike[0] + _MORE)
-    return best if is_clear else 0
+    is_clear = alike[best] > _LEAST and (best == 0 or alike[best] > alike[0] + _MORE)
+    return best if is_clear else None
 
 
 def _correlation(here: FloatArray, there: FloatArray, lag: int) -> float:
