@@ -77,7 +77,8 @@ class _Compared:
     @property
     def is_suspected(self) -> bool:
         """Whether the first samples show an error, which are too few to tell it."""
-        return self.direction.is_suspected or self.aside.is_suspected
+        verdicts = self.direction, self.aside, self.unit
+        return any(one.is_suspected for one in verdicts)
 
     def remarks(self, name: str) -> Iterator[str]:
         """Yield warnings about doubtful extrinsics; some are empty."""

@@ -546,7 +546,7 @@ CASES = [
     Case("extrinsics unmeasured", 5.5, 6.5, of_extrinsics("turned", PROPORTIONS)),
     Case("height", 0.8, 1.3, height),
     Case("joints", 1.6, 1.7, joints),
-    Case("unit", 0.25, 0.35, of_extrinsics("unit")),
+    Case("unit", 0.25, 0.35, of_extrinsics("unit"), lasting=0.2, ending=0.1),
     Case("aside", 0.4, 0.8, aside, ending=0.2),
     Case("late", 0.1, 0.2, late),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
