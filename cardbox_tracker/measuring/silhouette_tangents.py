@@ -302,17 +302,31 @@ class PoseDirection:
 
     def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> FloatArray:
         """Return heights of the joints that both show, (2, n), rad; nan for others."""
-        angles = np.full((2, len(POINT_NAMES)), np.nan)
-        if one is None or other is None:
-            return angles
-        known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
-        pairs = zip(self._given[1:], self._cameras, (one, other), strict=True)
-        for number, (axes, camera, points) in enumerate(pairs):
-            angles[number, known] = np.arctan2(*(axes @ camera.rays(points.px[known]).T))
-        if np.count_nonzero(known) >= _LEAST_POINTS:
-            apart = np.abs(angles[0, known] - angles[1, known])
-            self.joints.see(float(np.degrees(np.median(apart))))
+        angles = self._heights(one, other)
+        apart_deg = _apart_deg(angles)
+        if apart_deg is not None:
+            self.joints.see(apart_deg)
         return angles
+
+    def joints_deg(self, one: ImagePoints | None, other: ImagePoints | None) -> float | None:
+        """Return the median angle between the planes of the same joints; None if few are known."""
+        return _apart_deg(self._heights(one, other))
+
+    def _heights(self, one: ImagePoints | None, other: ImagePoints | None) -> FloatArray:
+        angles = np.full((2, len(POINT_NAMES)), np.nan)
+        if one is not None and other is not None:
+            known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
+            pairs = zip(self._given[1:], self._cameras, (one, other), strict=True)
+            for number, (axes, camera, points) in enumerate(pairs):
+                angles[number, known] = np.arctan2(*(axes @ camera.rays(points.px[known]).T))
+        return angles
+
+
+def _apart_deg(angles: FloatArray) -> float | None:
+    apart = np.abs(angles[0] - angles[1])
+    known = np.isfinite(apart)
+    is_enough = np.count_nonzero(known) >= _LEAST_POINTS
+    return float(np.degrees(np.median(apart[known]))) if is_enough else None
 
 
 def _explained(given: float, supposed: float) -> float:

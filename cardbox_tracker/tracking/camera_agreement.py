@@ -162,18 +162,31 @@ class CameraAgreement:
         pairs = zip(views, before, strict=True)
         self._others: list[_Compared] = [_Compared(body, first, *one) for one in pairs]
         self._frames = 0
+        self._joints_deg = list[float | None]()
         # How far the person was in the frame before, by their size; None without a posture.
         self._away_m: float | None = None if earlier is None else earlier._away_m
 
     def look(self, frames: Sequence[Frame]) -> bool:
         """Compare upright frames, whether or not a posture fits; return whether they count."""
         first, *others = frames
+        pairs = [*zip(self._others, others, strict=True)]
         if not _are_whole(frames):
+            self._joints_deg = [
+                one.direction.joints_deg(first.points, other.points) for one, other in pairs
+            ]
             return False
-        for one, other in zip(self._others, others, strict=True):
+        for one, other in pairs:
             one.look(first, other, self._away_m)
         self._away_m = None
         return True
+
+    def take_joints(self) -> list[float | None]:
+        """Return :meth:`.PoseDirection.joints_deg` of each further camera in a frame, once.
+
+        They are known of frames in which others hide pixels of the person.
+        """
+        found, self._joints_deg = self._joints_deg or [None] * len(self._others), []
+        return found
 
     @property
     def are_contradicted(self) -> list[bool]:
