@@ -365,7 +365,8 @@ class Tracker:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
             return Estimate(LOST)
-        if self.config.has_several_views and fit.iou < _TOUCHING_IOU:
+        is_known = len(frames) > 1 or any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_known and fit.iou < _TOUCHING_IOU:
             # The person is there, but not where the model is.
             if self.config.relocalize:
                 self._before = None
