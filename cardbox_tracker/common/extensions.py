@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Container
+from collections.abc import Callable, Container
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any
+from typing import Any, TypeVar
 
-from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.errors import CardboxError, cut
+
+R = TypeVar("R")
 
 DETECTORS, EXPORTERS = "detectors", "exporters"
 
@@ -31,13 +33,25 @@ def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
 
 def loaded(entry: EntryPoint) -> Any:
     """Return what an entry point names; CardboxError, with its distribution, if that fails."""
+    what = f"{entry.name} of {place_of(entry)} cannot be imported from {entry.value}"
+    return called(entry.load, what)
+
+
+def called(call: Callable[[], R], what: str, expected: str = "") -> R:
+    """Return what foreign code returns; if it fails, raise CardboxError that begins with ``what``.
+
+    It may end with anything, such as what ends a program.
+    """
     try:
-        return entry.load()
-    except Exception as error:
-        raise CardboxError(
-            f"{entry.name} of {place_of(entry)} cannot be imported from {entry.value}: "
-            f"{type(error).__name__}: {error}"
-        ) from error
+        return call()
+    except (CardboxError, KeyboardInterrupt):
+        raise
+    except BaseException as error:
+        try:
+            why = cut(str(error))
+        except Exception:
+            why = "its text is unknown"
+        raise CardboxError(f"{what}: {type(error).__name__}: {why}{expected}") from error
 
 
 def place_of(entry: EntryPoint) -> str:

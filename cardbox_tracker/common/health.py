@@ -58,6 +58,7 @@ class Verdict:
 
     Attributes:
         holds: whether the fault is there.
+        is_suspected: whether it seems to be, by fewer samples than a verdict needs.
         value: the measure that was judged last; 0 before.
         medians: median of each part of the samples; empty before there are enough.
         samples: the latest ones.
@@ -69,16 +70,19 @@ class Verdict:
         ``of`` returns the measure of the medians of the parts of the samples.
         """
         self.watch, self._of = WATCHES[name], of
-        self.holds, self.value, self.medians = False, 0.0, list[float]()
+        self.holds, self.is_suspected = False, False
+        self.value, self.medians = 0.0, list[float]()
         self.samples = deque[tuple[float, ...]](maxlen=self.watch.window)
 
     def see(self, *sample: float) -> bool:
         """Take a sample, of one part or several; return whether the fault is there."""
         self.samples.append(sample)
-        if len(self.samples) >= self.watch.least:
-            self.medians = [median(part) for part in zip(*self.samples, strict=True)]
-            self.value = self._of(*self.medians)
-            self.holds = self.watch.is_beyond(self.value, self.holds)
+        medians = [median(part) for part in zip(*self.samples, strict=True)]
+        value, is_enough = self._of(*medians), len(self.samples) >= self.watch.least
+        self.is_suspected = not is_enough and self.watch.is_beyond(value)
+        if is_enough:
+            self.medians, self.value = medians, value
+            self.holds = self.watch.is_beyond(value, self.holds)
         return self.holds
 
     def count(self, is_so: bool) -> bool:

@@ -46,7 +46,7 @@ class Detector(NamedTuple):
         Raises CardboxError if the networks cannot be loaded.
         """
         if isinstance(self.models, OwnModel):
-            network: PoseNetwork = OwnNetwork(self.models.make())
+            network: PoseNetwork = OwnNetwork(self.models)
         else:
             network = PoseNetwork(*self.models)
         return PersonDetector(network, PeopleNetwork(network, self.people) if self.people else None)

@@ -83,7 +83,8 @@ class FoundPerson(NamedTuple):
 
 def openpose_people(folder: Path) -> Iterator[FoundPerson]:
     """Yield the people in a folder of OpenPose's files; raise CardboxError if there are none."""
-    files = sorted(folder.glob("*.json"))
+    # macOS puts a hidden file beside each on drives of other systems.
+    files = sorted(file for file in folder.glob("*.json") if not file.name.startswith("."))
     if not files:
         raise CardboxError(
             f"{folder} has no JSON files; expected those of OpenPose, one for each image, such as "

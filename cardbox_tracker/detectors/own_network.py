@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.given_arrays import silhouette_from
-from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
+from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
+from cardbox_tracker.common.extensions import called
 from cardbox_tracker.detectors.point_checks import MOST_PEOPLE, check_person, check_point
 from cardbox_tracker.detectors.pose_network import (
     LANDMARKS,
@@ -44,6 +45,7 @@ class OwnModel(NamedTuple):
     """A detector's class, or a function that returns one, and its file, whose change counts."""
 
     make: Callable[[], FindsPeople]
+    name: str
     source: Path | None = None
 
     @classmethod
@@ -52,17 +54,18 @@ class OwnModel(NamedTuple):
         if not callable(getattr(given, "detect", None)):
             raise CardboxError(f"{name} has no function detect(image); docs/extending.md has one")
         if not isinstance(given, type):
-            return cls(lambda: given)
+            return cls(lambda: given, name)
         with suppress(OSError, TypeError):
-            return cls(given, Path(inspect.getfile(given)))
-        return cls(given)
+            return cls(given, name, Path(inspect.getfile(given)))
+        return cls(given, name)
 
 
 class OwnNetwork(PoseNetwork):
     """Follows one person among those whom a detector of one's own finds."""
 
-    def __init__(self, detector: FindsPeople) -> None:
-        self._own = detector
+    def __init__(self, model: OwnModel) -> None:
+        """Make the detector; CardboxError if that fails."""
+        self._own = called(model.make, f"{model.name} does not start")
         self._found: list[tuple[Detection, Square]] = []
         self.forget()
 
@@ -74,15 +77,14 @@ class OwnNetwork(PoseNetwork):
     def people_in(self, image: ColorImage) -> list[Detection]:
         """Return the people in an image (H, W, 3), bgr; CardboxError if what is found are none."""
         name, found = f"{type(self._own).__name__}.detect", list[Detection]()
-        try:
-            people: Any = self._own.detect(np.ascontiguousarray(image))
-            if isinstance(people, Iterable):
-                people = list(islice(people, MOST_PEOPLE + 1))
-        except (Exception, SystemExit) as error:
-            raise CardboxError(
-                f"{name} fails: {type(error).__name__}: {cut(str(error))}; expected a list of "
-                "people (docs/extending.md)"
-            ) from error
+
+        def detect() -> Any:
+            # Who draws into the image must not change what others see.
+            people: Any = self._own.detect(image.copy())
+            is_several = isinstance(people, Iterable)
+            return list(islice(people, MOST_PEOPLE + 1)) if is_several else people
+
+        people = called(detect, f"{name} fails", "; expected a list of people (docs/extending.md)")
         if not isinstance(people, list):
             raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
         if len(people) > MOST_PEOPLE:
@@ -90,7 +92,7 @@ class OwnNetwork(PoseNetwork):
         for number, person in enumerate(people):
             try:
                 found.append(_detection(person, image.shape[:2]))
-            except (CardboxError, ValueError, TypeError, AttributeError, ArithmeticError) as error:
+            except Exception as error:
                 raise CardboxError(
                     f"{name}, person {number}: {reason_of(error)}; expected column, row and "
                     "score, or these and x, y and z, by names of points"

@@ -21,7 +21,8 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.common.least_squares import Residuals, geman_mcclure
-from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
+from cardbox_tracker.detectors.image_points import CERTAIN, POINT_NAMES, ImagePoints
+from cardbox_tracker.measuring.motion_lag import MotionLag
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Silhouette
 
@@ -241,7 +242,8 @@ class PoseDirection:
             (Verdict("upside down", _explained), pencil, 2, 0),
         ]
         self._frames = 0
-        self._wrong, self.joints = Verdict("contradicted"), Verdict("joints")
+        self._wrong, self.height = Verdict("contradicted"), Verdict("height")
+        self.joints, self.lag = Verdict("joints"), MotionLag()
 
     @property
     def fault(self) -> Verdict | None:
@@ -251,53 +253,80 @@ class PoseDirection:
         return best if best.holds else None
 
     @property
-    def height_deg(self) -> float:
-        """Median angle between both cameras' tangent planes, degrees; 0 while unknown."""
-        return self._wrong.value
+    def is_suspected(self) -> bool:
+        """Whether too few samples for a verdict show any of the errors."""
+        supposed = (one for one, *_ in self._supposed)
+        return any(one.is_suspected for one in (self.height, self.joints, *supposed))
 
     def see(
         self,
         first: Silhouette,
         other: Silhouette,
         points: tuple[ImagePoints | None, ImagePoints | None] = (None, None),
+        stamp_ns: int | None = None,
     ) -> None:
         """Add a frame with silhouettes (H, W), 0 or 255, whether a posture fits them or not.
 
-        ``points`` are those of a detector in both images.
+        ``points`` are those of a detector in both images. Without a stamp, no lag is looked for.
         """
-        self._see_joints(*points)
+        heights = self._see_joints(*points), self._see_silhouettes(first, other)
+        if stamp_ns is not None:
+            self.lag.add(stamp_ns, *np.hstack(heights))
+
+    def _see_silhouettes(self, first: Silhouette, other: Silhouette) -> FloatArray:
+        """Return the height of the top in both cameras, (2, 1), rad; nan where it is unknown."""
+        tops = np.full((2, 1), np.nan)
         self._frames += 1
         if self._frames > _FIRST and self._frames % _EVERY:
-            return
+            return tops
         hulls = [
             [_hull_of(px, camera, flip) for flip in flips]
             for mask, camera, flips in zip((first, other), self._cameras, self._flips, strict=True)
             if len(px := _outline(mask))
         ]
         if len(hulls) < len(self._cameras):
-            return
+            return tops
+        for number, ((hull, *_), axes) in enumerate(zip(hulls, self._given[1:], strict=True)):
+            ray, is_whole = _highest(hull, axes)
+            tops[number] = np.arctan2(*(axes @ ray)) if is_whole else np.nan
         given = abs(np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given)))
         if np.isfinite(given):
             self._wrong.see(given)
+            self.height.see(given)
         for verdict, pencil, here, there in self._supposed:
             supposed = abs(np.degrees(_height_of(hulls[0][here], hulls[1][there], pencil)))
             if np.isfinite(given) or np.isfinite(supposed):
                 # A supposed fault is none if it does not even show the top, as is the given pose.
                 verdict.see(*(float(np.nan_to_num(one, nan=np.inf)) for one in (given, supposed)))
+        return tops
 
-    def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> None:
-        if one is None or other is None:
-            return
-        known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
-        if np.count_nonzero(known) < _LEAST_POINTS:
-            return
-        angles = [
-            np.arctan2(*(axes @ camera.rays(points.px[known]).T))
-            for axes, camera, points in zip(
-                self._given[1:], self._cameras, (one, other), strict=True
-            )
-        ]
-        self.joints.see(float(np.degrees(np.median(np.abs(angles[0] - angles[1])))))
+    def _see_joints(self, one: ImagePoints | None, other: ImagePoints | None) -> FloatArray:
+        """Return heights of the joints that both show, (2, n), rad; nan for others."""
+        angles = self._heights(one, other)
+        apart_deg = _apart_deg(angles)
+        if apart_deg is not None:
+            self.joints.see(apart_deg)
+        return angles
+
+    def joints_deg(self, one: ImagePoints | None, other: ImagePoints | None) -> float | None:
+        """Return the median angle between the planes of the same joints; None if few are known."""
+        return _apart_deg(self._heights(one, other))
+
+    def _heights(self, one: ImagePoints | None, other: ImagePoints | None) -> FloatArray:
+        angles = np.full((2, len(POINT_NAMES)), np.nan)
+        if one is not None and other is not None:
+            known = (one.scores >= CERTAIN) & (other.scores >= CERTAIN)
+            pairs = zip(self._given[1:], self._cameras, (one, other), strict=True)
+            for number, (axes, camera, points) in enumerate(pairs):
+                angles[number, known] = np.arctan2(*(axes @ camera.rays(points.px[known]).T))
+        return angles
+
+
+def _apart_deg(angles: FloatArray) -> float | None:
+    apart = np.abs(angles[0] - angles[1])
+    known = np.isfinite(apart)
+    is_enough = np.count_nonzero(known) >= _LEAST_POINTS
+    return float(np.degrees(np.median(apart[known]))) if is_enough else None
 
 
 def _explained(given: float, supposed: float) -> float:

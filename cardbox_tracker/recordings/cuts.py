@@ -7,6 +7,7 @@ light). After a flash or a damaged image, the next one agrees with the one befor
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import TypeVar
 
@@ -26,6 +27,9 @@ _DIFFERS, _MOST = 12, 0.5
 # Correlation of images of the same place where most grey values differ, by light or motion; those
 # of different places rarely have it.
 _ALIKE = 0.6
+# Cameras that take turns: images that are judged, the share of them that alternate, the correlation
+# of images of one camera in other light, and the share that changes between two of its images.
+_TURNS, _MOST_TURNS, _SAME, _STILL = 20, 0.8, 0.9, 0.1
 
 
 def with_cuts(items: Iterable[T], image_of: Callable[[T], Image]) -> Iterator[tuple[T, bool]]:
@@ -48,6 +52,28 @@ def with_cuts(items: Iterable[T], image_of: Callable[[T], Image]) -> Iterator[tu
         yield held[0], False
 
 
+class Turns:
+    """Two cameras on one topic that take turns: every second image shows the same, and no other.
+
+    Light that changes from image to image leaves the grey values alike.
+    """
+
+    def __init__(self) -> None:
+        """Begin before the first image."""
+        self._last = deque[Image](maxlen=2)
+        self._alternate = deque[bool](maxlen=_TURNS)
+
+    def see(self, image: Image) -> bool:
+        """Take the next image, (H, W) grey or (H, W, 3) bgr; return whether cameras take turns."""
+        now = _reduced(image)
+        if len(self._last) == self._last.maxlen:
+            again, before = self._last
+            is_other = _changed(now, before) > _MOST and _correlation(now, before) < _SAME
+            self._alternate.append(is_other and _changed(now, again) < _STILL)
+        self._last.append(now)
+        return sum(self._alternate) > _MOST_TURNS * _TURNS
+
+
 def _reduced(image: Image) -> Image:
     reduced = cv2.resize(brightness_of(image), _SIZE, interpolation=cv2.INTER_AREA)
     return np.asarray(reduced, np.uint8)
@@ -55,8 +81,15 @@ def _reduced(image: Image) -> Image:
 
 def _is_other(one: Image, other: Image) -> bool:
     """Return whether two reduced images do not show the same place."""
-    if np.count_nonzero(cv2.absdiff(one, other) > _DIFFERS) <= _MOST * one.size:
+    if _changed(one, other) <= _MOST:
         return False
     down, across = _MARGIN
-    middle = one[down:-down, across:-across]
-    return float(cv2.matchTemplate(other, middle, cv2.TM_CCOEFF_NORMED).max()) < _ALIKE
+    return _correlation(other, one[down:-down, across:-across]) < _ALIKE
+
+
+def _changed(one: Image, other: Image) -> float:
+    return float(np.count_nonzero(cv2.absdiff(one, other) > _DIFFERS)) / one.size
+
+
+def _correlation(image: Image, part: Image) -> float:
+    return float(cv2.matchTemplate(image, part, cv2.TM_CCOEFF_NORMED).max())

@@ -69,8 +69,10 @@ def watch(
         shot.images += 1
         if shot.images > longest.images:
             longest = shot
-        shot.frames.add(partial(_whole, frame))
-        shot.pictures.add(partial(_picture, taken))
+        if taken.frames[0] is not None:
+            # Further cameras may be the only ones that have an image.
+            shot.frames.add(partial(_whole, frame))
+            shot.pictures.add(partial(_picture, taken))
         if chosen is None:
             assign(shot.people, frame, taken.time_s)
             continue

@@ -24,7 +24,7 @@ from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.point_table import GivenPoints, Image, PointTable
 from cardbox_tracker.detectors.pose_network import Detection, image_points
-from cardbox_tracker.recordings.cuts import with_cuts
+from cardbox_tracker.recordings.cuts import Turns, with_cuts
 from cardbox_tracker.recordings.image_recording import RecordedImage
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.turned_back import TurnedBack
@@ -418,8 +418,13 @@ class SilhouetteSource:
             yield from kept
             return
         keeps = self._file is not None and self._kept == 0
-        shown = with_cuts(self._read(kept), lambda one: one.image)
+        shown, turns = with_cuts(self._read(kept), lambda one: one.image), Turns()
         for used, (found, is_cut) in enumerate(shown, 1):
+            if turns.see(found.image):
+                raise BagError(
+                    f"cameras take turns on {self.topic}: every second image shows another place; "
+                    "give each camera a topic of its own"
+                )
             # Of several passes, the longest counts.
             self._used = max(self._used, used)
             found = found._replace(is_cut=is_cut)

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Iterator, Sequence
+from math import atan2
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import Frame
+from cardbox_tracker.tracking.tracked_camera import middle
 
 # Samples in a window (12 s at 15 Hz), and between two checks.
 _WINDOW, _AGAIN = 15, 60
@@ -39,6 +41,9 @@ LEAST_SIGHTINGS = 8
 _TOPS, _SURE_DEG = 70, 0.5
 # Least sine of the angle between lines of sight that show a distance.
 _LEAST_ANGLE = 0.2
+# Lines of sight at a smaller angle are those of a narrow pair. Where the tracker looks for a
+# person, m, and how far a distance by the size may be off.
+_NARROW_DEG, _SEEN_M, _SIZES = 10.0, (0.7, 7.6), np.array([0.85, 1.15])
 
 
 class _Compared:
@@ -59,15 +64,26 @@ class _Compared:
             else earlier.direction
         )
         self.is_measured = body.source == MEASURED
+        self.aside: Verdict = Verdict("aside") if earlier is None else earlier.aside
         self.turned = Verdict("extrinsics" if self.is_measured else "extrinsics unmeasured")
         self.rolled, self.unit = Verdict("rolled", abs), Verdict("unit", abs)
         self._distance_m = body.placement.distance_m
 
+    @property
+    def fault(self) -> Verdict | None:
+        """A gross error, so that images are not used; None without one."""
+        return self.direction.fault or (self.aside if self.aside.holds else None)
+
+    @property
+    def is_suspected(self) -> bool:
+        """Whether the first samples show an error, which are too few to tell it."""
+        verdicts = self.direction, self.aside, self.unit
+        return any(one.is_suspected for one in verdicts)
+
     def remarks(self, name: str) -> Iterator[str]:
         """Yield warnings about doubtful extrinsics; some are empty."""
-        fault = self.direction.fault
-        if fault is not None:
-            yield fault.remark(name=name)
+        if self.fault is not None:
+            yield self.fault.remark(name=name)
             return
         if self.unit.holds:
             given_m = float(np.linalg.norm(self.view.offset_m))
@@ -78,9 +94,36 @@ class _Compared:
             shown = _shown(self.turned.value)
             yield WATCHES["extrinsics"].words.format(name=name, shown=shown)
         else:
-            yield WATCHES["height"].remark(self.direction.height_deg, name=name)
+            yield self.direction.height.remark(name=name)
         yield self.direction.joints.remark(name=name)
+        yield self.direction.lag.remark(name)
         yield self.rolled.remark(name=name, shown=_shown(self.rolled.value))
+
+    def look(self, first: Frame, other: Frame, distance_m: float | None) -> None:
+        """Compare silhouettes and points, whether or not a posture fits.
+
+        Of a narrow pair, whose silhouettes have the same middle, the angle between both lines of
+        sight shows the distance, which is ``distance_m`` by the size, if that is known.
+        """
+        points = first.points, other.points
+        self.direction.see(first.silhouette, other.silhouette, points, first.stamp_ns)
+        columns = middle(first.silhouette), middle(other.silhouette)
+        if columns[0] is None or columns[1] is None:
+            return
+        here = (columns[0] - first.camera.cx) / first.camera.fx
+        there = (columns[1] - other.camera.cx) / other.camera.fx
+        at, ahead = map(np.array, self.view.line_of_sight(there))
+        before = np.array([-1.0, here])
+
+        def angle(line: FloatArray, away_m: float) -> float:
+            to = away_m * before - at
+            return float(np.degrees(atan2(line[0] * to[1] - line[1] * to[0], line @ to)))
+
+        if abs(angle(before, distance_m or self._distance_m)) < _NARROW_DEG:
+            range_m = _SEEN_M if distance_m is None else distance_m * _SIZES
+            off = np.array([angle(ahead, away_m) for away_m in range_m])
+            across = 0.0 if off.prod() <= 0.0 else np.abs(off).min()
+            self.aside.see(max(across, self.direction.height.value))
 
     def place(self, state: FloatArray, column: float) -> None:
         """Compare how far the person is by their size and by both cameras' lines of sight.
@@ -119,26 +162,41 @@ class CameraAgreement:
         pairs = zip(views, before, strict=True)
         self._others: list[_Compared] = [_Compared(body, first, *one) for one in pairs]
         self._frames = 0
+        self._joints_deg = list[float | None]()
+        # How far the person was in the frame before, by their size; None without a posture.
+        self._away_m: float | None = None if earlier is None else earlier._away_m
 
     def look(self, frames: Sequence[Frame]) -> bool:
         """Compare upright frames, whether or not a posture fits; return whether they count."""
         first, *others = frames
+        pairs = [*zip(self._others, others, strict=True)]
         if not _are_whole(frames):
+            self._joints_deg = [
+                one.direction.joints_deg(first.points, other.points) for one, other in pairs
+            ]
             return False
-        for one, other in zip(self._others, others, strict=True):
-            points = first.points, other.points
-            one.direction.see(first.silhouette, other.silhouette, points)
+        for one, other in pairs:
+            one.look(first, other, self._away_m)
+        self._away_m = None
         return True
+
+    def take_joints(self) -> list[float | None]:
+        """Return :meth:`.PoseDirection.joints_deg` of each further camera in a frame, once.
+
+        They are known of frames in which others hide pixels of the person.
+        """
+        found, self._joints_deg = self._joints_deg or [None] * len(self._others), []
+        return found
 
     @property
     def are_contradicted(self) -> list[bool]:
         """Whether the silhouettes show a gross error of the pose of each further camera."""
-        return [one.direction.fault is not None for one in self._others]
+        return [one.fault is not None for one in self._others]
 
     @property
     def are_doubtful(self) -> list[bool]:
-        """Whether anything is told of each further camera."""
-        return [any(one.remarks("")) for one in self._others]
+        """Whether anything is told, or suspected, of each further camera."""
+        return [one.is_suspected or any(one.remarks("")) for one in self._others]
 
     def see(
         self, state: FloatArray, frames: Sequence[Frame], columns: Sequence[float | None] = ()
@@ -147,6 +205,7 @@ class CameraAgreement:
 
         ``columns``, px, are the middles of what further cameras show in front of the background.
         """
+        self._away_m = self._body.placement.distance_m - float(state[TORSO_X])
         if not _are_whole(frames):
             return
         for one, column in zip(self._others, columns, strict=False):

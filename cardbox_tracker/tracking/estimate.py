@@ -27,6 +27,7 @@ from cardbox_tracker.person.skeleton import (
     limits_of,
     rows_of,
 )
+from cardbox_tracker.search.doubt import doubted
 
 OPEN, CLOSED = 0.75, 0.25
 """A hand is open above the first value of ``Hand.open``, and closed below the second."""
@@ -34,6 +35,8 @@ HAND_KEYPOINTS = 2, 5
 """Left and right hand among the keypoints."""
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 FILLED = "filled"
+CONTRADICTED = "the cameras contradict each other"
+"""Reason of a doubt."""
 
 KEPT_S = 0.5
 """Time for which a head or a hand that is not found keeps its result, s."""
@@ -156,6 +159,15 @@ class Estimate:
     #: ``STATE_NAMES``, then of the coordinates of keypoints, in rad, m and s; None unless smoothing
     #: was asked for them, and nan where they are unknown
     rates: FloatArray | None = None
+
+    def contradicted(self) -> Estimate:
+        """Return the estimate as one of cameras that contradict each other."""
+        place = self.place and replace(self.place, contradiction=CONTRADICTED)
+        if self.state != TRACKING:
+            return replace(self, place=place)
+        states = self.keypoint_states and doubted(self.keypoint_states)
+        doubt = replace(self, state=UNCERTAIN, reason=CONTRADICTED, keypoint_states=states)
+        return replace(doubt, place=place)
 
     @property
     def vertical_state(self) -> KeypointState | None:

@@ -230,6 +230,8 @@ class Session:
         self._seen: dict[int, _Share] = {}
         # Images in a row with somebody new, by camera.
         self._new = [0] * (1 + len(self._others))
+        # Of several people, what the joints of all say of each further camera.
+        self._joints = [Verdict("joints") for _ in self._others]
         self._last_ns: int | None = None
         self._checked: Future[None] | None = None
         for number in [None] if people is None else range(1, max(people, only or 0) + 1):
@@ -284,6 +286,8 @@ class Session:
         """Return warnings about images that contradict each other; ``is_all`` adds past ones."""
         told = [text for one in self.trackers for text in one.remarks(names, is_all)]
         told += self._exchanged_statures()
+        pairs = zip(names[1:], self._joints, strict=False)
+        told += [one.remark(name=name) for name, one in pairs if one.holds]
         told += () if self._scene is None else self._scene.remarks
         if self.agreement is not None:
             told += self.agreement.remarks(names[1:])
@@ -367,7 +371,19 @@ class Session:
         is_told = not self._others and first is not None and "people" in first.channels
         for person in self._given if is_told else self._people:
             person.estimate = self._tracked(person, [one.get(person.number) for one in seen])
-        return [person.estimate for person in self._given]
+        found = [person.estimate for person in self._given]
+        return [one.contradicted() for one in found] if self._are_contradicted() else found
+
+    def _are_contradicted(self) -> bool:
+        """Return whether a further camera contradicts the first one, by all people's joints.
+
+        Those of one person may be guessed, or be somebody else's, where others hide them.
+        """
+        shown = [one.take_joints() for person in self._people if (one := person.tracker.agreement)]
+        for verdict, angles in zip(self._joints, zip(*shown, strict=True), strict=False):
+            if known := [angle_deg for angle_deg in angles if angle_deg is not None]:
+                verdict.see(min(known))
+        return any(one.holds or one.is_suspected for one in self._joints)
 
     def _start_anew(self) -> None:
         """Forget all places, so that people are known by their colours alone."""

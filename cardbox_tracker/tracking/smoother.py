@@ -55,7 +55,7 @@ from cardbox_tracker.person.skeleton import (
     rows_of,
 )
 from cardbox_tracker.search.arm_search import ARM_LIMITS
-from cardbox_tracker.tracking.estimate import FILLED, Estimate, Legs
+from cardbox_tracker.tracking.estimate import CONTRADICTED, FILLED, Estimate, Legs
 
 T = TypeVar("T")
 
@@ -155,12 +155,22 @@ class Smoother(Generic[T]):
             return early + self.add(image, stamp_ns, estimates, bodies)
         pairs = zip(estimates, bodies, strict=True)
         results = [_Result(estimate, body, _values(estimate)) for estimate, body in pairs]
+        for person, result in enumerate(results):
+            if result.estimate.reason == CONTRADICTED:
+                self._doubt(person)
         self._images.append(_Image(image, stamp_ns, results))
         waiting_s = (stamp_ns - self._images[self._done].stamp_ns) / 1e9
         lag_s = max(self._how.lag_s, self._how.longest_gap_s)
         if waiting_s < lag_s + self._how.every_s:
             return []
         return self._finished(stamp_ns - round(1e9 * lag_s))
+
+    def _doubt(self, person: int) -> None:
+        """Doubt the latest images of a person, which came before cameras were known to be wrong."""
+        for one in self._images[self._done :]:
+            if person < len(one.results):
+                before = one.results[person]
+                one.results[person] = before._replace(estimate=before.estimate.contradicted())
 
     def finish(self) -> list[tuple[T, list[Estimate]]]:
         """Return all images that were not yet returned."""

@@ -30,7 +30,14 @@ from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Posed, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.camera_faults import CameraFaults
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import (
+    CONTRADICTED,
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
 from cardbox_tracker.tracking.facing import Facing
 from cardbox_tracker.tracking.hands import HandReader, Look
 from cardbox_tracker.tracking.head import HeadTracker
@@ -358,8 +365,8 @@ class Tracker:
             # Without a reset, values that are not finite would stay in the particles.
             self.reset()
             return Estimate(LOST)
-        is_detected = any(frame.points is not None for frame in frames)
-        if self.config.has_several_views and is_detected and fit.iou < _TOUCHING_IOU:
+        is_known = len(frames) > 1 or any(frame.points is not None for frame in frames)
+        if self.config.has_several_views and is_known and fit.iou < _TOUCHING_IOU:
             # The person is there, but not where the model is.
             if self.config.relocalize:
                 self._before = None
@@ -397,7 +404,7 @@ class Tracker:
         if self._facing is not None and self._before is not None:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return BACK if self._facing.shows_back else ""
-        return "the cameras contradict each other" if self.faults.is_contradicted else ""
+        return CONTRADICTED if self.faults.is_contradicted else ""
 
 
 def is_at_two_limits(posture: FloatArray) -> bool:

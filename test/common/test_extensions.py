@@ -27,6 +27,8 @@ def write(path, motion, body):
 
 counted = Format(".counted", write)
 no_format = 7
+no_ending = Format("", write)
+no_library = Format(".none", write, lambda: 1 / 0)
 
 class Sees:
     def detect(self, image):
@@ -92,6 +94,8 @@ def test_a_detector_is_found_by_its_name(add: Callable[..., None]) -> None:
         ("broken = nowhere:x", "broken of counts cannot be imported from nowhere:x: ModuleNot"),
         ("broken = beside:absent", "broken of counts cannot be imported .*: AttributeError"),
         ("broken = beside:no_format", "broken of counts is no <class .*Format"),
+        ("broken = beside:no_ending", "broken of counts is no <class .*Format.* ending"),
+        ("broken = beside:no_library", "broken of counts cannot be used: ZeroDivisionError"),
     ],
 )
 def test_a_broken_format_names_its_distribution(
@@ -126,6 +130,17 @@ def test_a_format_that_fails_leaves_the_old_file(
         formats()["counted"].write(path, Motion.of(read_result(table_in(tmp_path))), None)
     assert path.read_text() == "old"
     assert list(path.parent.iterdir()) == [path]
+
+
+def test_a_format_cannot_change_what_others_write(add: Callable[..., None], tmp_path: Path) -> None:
+    (tmp_path / "beside.py").write_text(
+        MODULE.replace("path.write_text", "motion.states[:] = 7; path.write_text")
+    )
+    add("counts", "exporters", "counted = beside:counted")
+    motion = Motion.of(read_result(table_in(tmp_path)))
+    before = motion.states.copy()
+    formats()["counted"].write(tmp_path / "me.counted", motion, None)
+    assert np.array_equal(motion.states, before, equal_nan=True)
 
 
 def test_a_name_that_two_have_is_told(add: Callable[..., None]) -> None:

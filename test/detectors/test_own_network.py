@@ -92,6 +92,7 @@ def raising(error: BaseException) -> Iterator[Any]:
     ("people", "expected"),
     [
         (raising(SystemExit(3)), "Scripted.detect fails: SystemExit: 3"),
+        (raising(GeneratorExit()), "Scripted.detect fails: GeneratorExit"),
         (raising(OSError("no model")), "Scripted.detect fails: OSError: no model"),
         (
             [{"nose": (10**400, 2, 1)}],
@@ -115,6 +116,36 @@ def test_a_detector_that_stops_is_named() -> None:
 
     with pytest.raises(CardboxError, match=r"Stops.detect fails: StopIteration"):
         Detector(OwnModel.of(Stops(), "it")).start()(IMAGE, 0)
+
+
+@pytest.mark.parametrize("ends", [SystemExit(3), RuntimeError("no weights")])
+def test_a_detector_that_does_not_start_is_named(ends: BaseException) -> None:
+    class Heavy(Scripted):
+        def __init__(self) -> None:
+            raise ends
+
+    with pytest.raises(CardboxError, match=f"it does not start: {type(ends).__name__}"):
+        Detector(OwnModel.of(Heavy, "it")).start()
+
+
+def test_numbers_that_cannot_be_read_are_named() -> None:
+    class Elsewhere:
+        def __float__(self) -> float:
+            raise RuntimeError("on the GPU")
+
+    with pytest.raises(CardboxError, match=r"Scripted.detect, person 0: on the GPU"):
+        detector([{"nose": (Elsewhere(), 1, 1)}]).start()(IMAGE, 0)
+
+
+def test_a_detector_that_draws_leaves_the_image() -> None:
+    class Draws(Scripted):
+        def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+            image[:] = 255
+            return super().detect(image)
+
+    image = IMAGE.copy()
+    Detector(OwnModel.of(Draws([person(40)]), "it")).start()(image, 0)
+    assert np.array_equal(image, IMAGE)
 
 
 def test_one_person_is_followed_whatever_the_order() -> None:

@@ -373,6 +373,13 @@ def test_openpose_hands_give_the_knuckles(tmp_path: Path) -> None:
     assert points.scores[POINT_INDEX["right_index"]] == 0.0
 
 
+def test_hidden_files_of_macos_beside_those_of_openpose_are_passed_over(tmp_path: Path) -> None:
+    folder = tmp_path / "points"
+    openpose(folder, 3, person(320))
+    (folder / "._film2_000000000003_keypoints.json").write_bytes(b"\0\5\26\7" + bytes(30))
+    assert read(PointTable(folder)).at(Image(0, 3), NONE) is not None
+
+
 def annotations(flags: int) -> dict[str, object]:
     keypoints = [flags if i % 3 == 2 else value for i, value in enumerate(person(320))]
     return {

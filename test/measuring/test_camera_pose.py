@@ -325,7 +325,7 @@ def test_the_direction_of_a_pose_is_judged(
     found = judged(extrinsics, is_exchanged)
     assert told(found) == fault
     if fault == "contradicted":
-        assert found.height_deg == pytest.approx(5.0, abs=0.7)
+        assert found.height.value == pytest.approx(5.0, abs=0.7)
 
 
 @pytest.mark.parametrize("camera", [0, 1])
@@ -355,6 +355,18 @@ def test_a_mirrored_camera_is_told_if_it_is_also_turned_about_its_axis() -> None
     (fault,) = (one.direction.fault for one in asked._others)
     assert fault is not None and fault.watch.name == "mirrored"
     assert fault.medians[1] < 0.1
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, 4.0])
+def test_the_first_image_of_a_wrong_pose_is_doubted_before_anything_is_told(
+    turned_deg: float,
+) -> None:
+    wrong = moved_by(TRUE, np.radians([turned_deg, *[0.0] * 5]))
+    view = View.of(BODY, CAMERA, OtherCamera(OTHER, wrong))
+    asked, frame = CameraAgreement(BODY, CAMERA, [view]), sightings(waving(1))[0]
+    asked.look(framed(frame.first, view.upright(frame.other, is_mask=True)))
+    assert asked.are_doubtful == [turned_deg > 0.0]
+    assert asked.remarks(["cam1"]) == []
 
 
 @pytest.mark.parametrize(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import cv2
 import numpy as np
 
-from cardbox_tracker.recordings.cuts import with_cuts
+from cardbox_tracker.recordings.cuts import Turns, with_cuts
 
 
 def room(seed: int, column: int = 0) -> np.ndarray:
@@ -58,3 +58,22 @@ def test_all_images_are_given_once() -> None:
         *range(5)
     ]
     assert list(with_cuts([], lambda one: one)) == []
+
+
+def take_turns(images: list[np.ndarray]) -> list[bool]:
+    turns = Turns()
+    return [turns.see(np.asarray(one, np.uint8)) for one in images]
+
+
+def test_two_cameras_on_one_topic_are_told_within_two_dozen_images() -> None:
+    told = take_turns([room(1 + number % 2) for number in range(24)])
+    assert not any(told[:16]) and all(told[20:])
+
+
+def test_one_camera_does_not_take_turns() -> None:
+    still, pan = [room(1)] * 30, [room(1, 10 * k) for k in range(32)]
+    light = [room(1) * (0.4 if k % 2 else 1.0) for k in range(30)]
+    shots = [room(1 + k // 5) for k in range(30)]
+    flashes = [np.full((240, 320, 3), 255.0) if k % 5 == 0 else room(1) for k in range(30)]
+    for film in (still, pan, light, shots, flashes):
+        assert not any(take_turns(film))

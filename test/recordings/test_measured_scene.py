@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+from typing import Any
+
 import cv2
 import numpy as np
 import pytest
@@ -12,7 +15,8 @@ from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.scene_watch import Spread
 from cardbox_tracker.recordings.films import Person, assign
-from cardbox_tracker.recordings.measured_scene import frames_of
+from cardbox_tracker.recordings.measured_scene import frames_of, watch
+from cardbox_tracker.recordings.recording import FrameSet
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 
 RED, BLUE = (40, 40, 220), (220, 60, 40)
@@ -83,6 +87,20 @@ def test_references_show_the_silhouette_of_whom_is_chosen_alone() -> None:
         columns = np.nonzero(one.silhouette.any(axis=0))[0]
         assert (columns.min(), columns.max()) == (200, 240)
     assert frames_of(PersonChoice("left"), [], camera) == []
+
+
+def test_times_without_an_image_of_the_first_camera_show_no_scene() -> None:
+    """Pictures have the size of the recording, the black ones of such times a smaller one."""
+    camera = Camera(SHAPE[1], SHAPE[0], 260.0, 260.0, 159.5, 119.5)
+    seen = frame((160.0, RED), found=1)
+    sets = [
+        FrameSet(i, i / 15, (seen if i else None, seen), seen, picture=lambda: seen.image)
+        for i in range(4)
+    ]
+    recording: Any = SimpleNamespace(
+        sources=[], first=SimpleNamespace(camera=camera), others=[], frames=lambda *_: sets
+    )
+    assert [time_s for time_s, _ in watch(recording).pictures] == [i / 15 for i in (1, 2, 3)]
 
 
 def test_items_that_are_left_out_do_not_count_where_one_is_due() -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import permutations
 from types import SimpleNamespace
 from typing import Any
@@ -28,7 +29,14 @@ from cardbox_tracker.terms.term import Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking import session
-from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import (
+    CONTRADICTED,
+    LOST,
+    NO_PERSON,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.session import Session
 
@@ -304,6 +312,40 @@ def test_a_camera_that_misses_a_person_takes_their_place_from_the_other(detected
         found = people.track(seen)
         assert [one.person for one in found] == [1, 2]
         assert places(found) == pytest.approx([-0.6, 0.6], abs=0.15)
+
+
+@pytest.mark.parametrize("lower_px", [0, 18])
+def test_a_second_camera_that_contradicts_the_joints_of_all_people_is_told(
+    detected: Detect, lower_px: int
+) -> None:
+    """The images are 18 px lower than the pose says, as after a pitch of 4 degrees."""
+    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
+    middle_m = np.array([0.0, 0.0, 2.6])
+    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
+    view = View.of(BODY, CAMERA, other)
+    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    for image in range(8):
+        seen = []
+        for body, states_of, down in ((BODY, np.copy, 0), (view.body, view.states, lower_px)):
+            masks, figures = [], []
+            for aside_m in (-0.6, 0.6):
+                state = states_of(place(aside_m))
+                there = Estimate("", offset_m=state[12:]).placed(body)
+                masks.append(render(cardbox_patches(there, state[:12]), CAMERA) > 0)
+                points = detected(body, CAMERA, state)
+                figures.append(replace(points, px=points.px + np.array((0.0, down))))
+            mask = np.where(np.any(masks, axis=0), np.uint8(255), np.uint8(0))
+            seen.append(
+                Observation(
+                    np.roll(mask, down, axis=0), stamp_ns=image * STEP_NS, people=tuple(figures)
+                )
+            )
+        found = people.track(seen)
+        is_doubted = [one.reason == CONTRADICTED for one in found if one.posture is not None]
+        assert not any(is_doubted) or lower_px
+        assert TRACKING not in {one.state for one in found} or not lower_px
+    told = [text for text in people.remarks(["cam0", "cam1"]) if "joints of the person" in text]
+    assert len(told) == (lower_px > 0)
 
 
 def test_the_gap_between_two_lines_of_sight_by_hand() -> None:

@@ -16,7 +16,16 @@ from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import LEFT_ARM, TORSO_X, YAW
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, STATE_NAMES
-from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, Estimate
+from cardbox_tracker.tracking.estimate import (
+    CONTRADICTED,
+    FILLED,
+    LOST,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+    Place,
+)
+from cardbox_tracker.tracking.place import SECOND_CAMERA
 from cardbox_tracker.tracking.smoother import Smoother, Smoothing
 
 RATE_HZ = 30.0
@@ -243,6 +252,19 @@ def test_with_a_lag_each_image_is_smoothed_with_those_until_then() -> None:
         np.testing.assert_allclose(
             found[last].placed_posture, until[last].placed_posture, atol=1e-3
         )
+
+
+def test_images_before_cameras_were_known_to_contradict_are_doubted_but_no_others() -> None:
+    place = Place(np.full(3, 0.1), 0.0, SECOND_CAMERA)
+    right = replace(estimate_of(AHEAD), place=place)
+    estimates = [right] * 60 + [replace(right, state=UNCERTAIN, reason=CONTRADICTED)] * 30
+    seen = smooth(estimates)
+    doubted = [one.reason == CONTRADICTED for one in seen]
+    assert all(doubted[45:]) and not any(doubted[:30])
+    for one, is_doubted in zip(seen[:60], doubted, strict=False):
+        assert one.state == (UNCERTAIN if is_doubted else TRACKING)
+        assert one.place is not None
+        assert one.place.state == ("uncertain" if is_doubted else "tracked")
 
 
 def test_a_clock_that_goes_back_ends_what_was_waited_for() -> None:

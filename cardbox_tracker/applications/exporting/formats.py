@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cache, partial
 from importlib.metadata import EntryPoint
@@ -16,8 +17,15 @@ from cardbox_tracker.applications.exporting.bvh import write_bvh
 from cardbox_tracker.applications.exporting.markers import ezc3d_or_error, write_c3d, write_trc
 from cardbox_tracker.applications.exporting.mot import write_mot, write_rates, write_sto
 from cardbox_tracker.applications.exporting.motion import Motion, images_of_body
-from cardbox_tracker.common.errors import CardboxError, cut
-from cardbox_tracker.common.extensions import EXPORTERS, extensions, loaded, optional, place_of
+from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import (
+    EXPORTERS,
+    called,
+    extensions,
+    loaded,
+    optional,
+    place_of,
+)
 from cardbox_tracker.common.files import atomic_path, scene_beside, write_table
 from cardbox_tracker.measuring.scene import Scene, load_scene
 from cardbox_tracker.person.isb_angles import ISB_NAMES, isb_angles
@@ -104,26 +112,20 @@ def _foreign(entry: EntryPoint) -> Format:
     name = f"{entry.name} of {place_of(entry)}"
     try:
         found = loaded(entry)
-        if not isinstance(found, Format):
-            raise CardboxError(f"{name} is no {Format}")
+        if not isinstance(found, Format) or not str(found.suffix).startswith("."):
+            raise CardboxError(f"{name} is no {Format} with an ending such as .trc")
     except CardboxError as error:
         return Format(f".{entry.name}", write_mot, partial(_raise, error))
 
     def write(path: Path, motion: Motion, body: BodyModel | None) -> None:
         with atomic_path(path) as there:
-            try:
-                found.write(there, motion, body)
-            except CardboxError:
-                raise
-            except (Exception, SystemExit) as error:
-                raise CardboxError(
-                    f"{name} fails, so {path} is not written: {type(error).__name__}: "
-                    f"{cut(str(error))}"
-                ) from error
+            # What it changes must not change what others write.
+            own = deepcopy((motion, body))
+            called(lambda: found.write(there, *own), f"{name} fails, so {path} is not written")
             if not there.is_file() or not there.stat().st_size:
                 raise CardboxError(f"{name} has not written the file whose path it was given")
 
-    return found._replace(write=write)
+    return found._replace(write=write, check=lambda: called(found.check, f"{name} cannot be used"))
 
 
 def _raise(error: Exception) -> None:

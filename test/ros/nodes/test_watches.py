@@ -31,6 +31,7 @@ from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import Figure
 from cardbox_tracker.detectors.identity import Identity
 from cardbox_tracker.detectors.image_points import ImagePoints
+from cardbox_tracker.measuring.motion_lag import MotionLag
 from cardbox_tracker.measuring.silhouette_tangents import PoseDirection, _explained
 from cardbox_tracker.person.model import PROPORTIONS, BodyModel
 from cardbox_tracker.ros.messages.conversions import camera_info_message
@@ -120,7 +121,7 @@ def contradicted(measures: Sequence[float]) -> Told:
         lower = round(300.0 * np.tan(np.radians(degrees)))
         for _ in range(15 * 6):
             direction.see(person(top), person(top + lower))
-        assert direction.height_deg == pytest.approx(degrees, abs=0.15)
+        assert direction.height.value == pytest.approx(degrees, abs=0.15)
         yield direction.fault is not None
 
 
@@ -146,9 +147,9 @@ def joints(measures: Sequence[float]) -> Told:
         yield direction.joints.holds
 
 
-def compared(source: str) -> CameraAgreement:
+def compared(source: str, pose: Extrinsics = BESIDE) -> CameraAgreement:
     body = BodyModel.of(source=source) if source else BodyModel()
-    view = View.of(body, CAMERA, OtherCamera(CAMERA, BESIDE))
+    view = View.of(body, CAMERA, OtherCamera(CAMERA, pose))
     return CameraAgreement(body, CAMERA, [view])
 
 
@@ -168,6 +169,32 @@ def height(measures: Sequence[float]) -> Told:
         for _ in range(15 * 6):
             agreement.look([Frame(CAMERA, channels, 240, 1) for channels in pair])
         yield agreement.remarks(["cam1"]) != []
+
+
+def aside(measures: Sequence[float]) -> Told:
+    """A camera 10 cm to the right shows the person aside of where a farther one would be."""
+    agreement = compared(PROPORTIONS, Extrinsics(np.eye(3), np.array([-0.1, 0.0, 0.0])))
+    farthest = 0.1 / (1.15 * BodyModel().placement.distance_m)
+    for degrees in measures:
+        # The person is at the left of the image.
+        there = np.tan(np.arctan(-0.2 - farthest) + np.radians(degrees))
+        pair = [{"silhouette": np.roll(person(), round(300.0 * at), 1)} for at in (-0.2, there)]
+        frames = [Frame(CAMERA, channels, 240, 1) for channels in pair]
+        for _ in range(15):
+            agreement.see(np.zeros(14), frames)
+            agreement.look(frames)
+        yield agreement.are_contradicted == [True]
+
+
+def late(measures: Sequence[float]) -> Told:
+    """Eight joints move at random, at 20 Hz, and in the other images by so much later."""
+    lag, noise = MotionLag(), np.random.default_rng(0)
+    moves = np.cumsum(noise.normal(0.0, 0.1, (300 * len(measures), 8)), axis=0)
+    for number, late_s in enumerate(measures):
+        for i in range(300 * number + 20, 300 * (number + 1)):
+            there = moves[i - round(20 * late_s)] + noise.normal(0.0, 0.05, 8)
+            lag.add(i * S // 20, moves[i], there)
+        yield "later" in lag.remark("cam1")
 
 
 def other_view(measures: Sequence[float]) -> Told:
@@ -519,7 +546,9 @@ CASES = [
     Case("extrinsics unmeasured", 5.5, 6.5, of_extrinsics("turned", PROPORTIONS)),
     Case("height", 0.8, 1.3, height),
     Case("joints", 1.6, 1.7, joints),
-    Case("unit", 0.25, 0.35, of_extrinsics("unit")),
+    Case("unit", 0.25, 0.35, of_extrinsics("unit"), lasting=0.2, ending=0.1),
+    Case("aside", 0.4, 0.8, aside, ending=0.2),
+    Case("late", 0.1, 0.2, late),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
     Case("distance", 1.85, 2.05, distance, lasting=1.1, ending=0.9),

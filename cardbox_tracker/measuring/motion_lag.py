@@ -1,0 +1,84 @@
+"""How much later one camera shows the motion of a person than another, by its cross-correlation.
+
+Heights about the baseline of two cameras, of joints or of the top of a silhouette, are the same in
+both images at one time, whatever the person does. Where images of different moments are paired,
+they agree best after a shift in time.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+
+from cardbox_tracker.common.health import Verdict
+from cardbox_tracker.person.sizes import FloatArray
+
+# Time whose motion is compared, between two comparisons, and the largest lag that is looked for.
+_WINDOW_NS, _EVERY_NS, _MOST_NS = 2_000_000_000, 200_000_000, 500_000_000
+# Least correlation at a lag, and how much larger it is than without; fewest pairs of heights.
+# Slow motions correlate at any lag.
+_LEAST, _MORE, _FEWEST = 0.9, 0.1, 10
+
+
+class MotionLag:
+    """Compares the motion in two cameras' images of the last seconds; ``verdict`` has the lag, s.
+
+    The median lag is positive if the second camera is late. A lag of one image is none, since
+    cameras that are not synchronized are paired within an image.
+    """
+
+    def __init__(self) -> None:
+        """Begin without images."""
+        self.verdict = Verdict("late", abs)
+        self._seen = deque[tuple[int, FloatArray, FloatArray]]()
+        self._due_ns = 0
+
+    def add(self, stamp_ns: int, here: FloatArray, there: FloatArray) -> None:
+        """Add heights (n,) in both cameras' images of one time, in the same order; nan if unknown.
+
+        Times that go back begin anew.
+        """
+        seen = self._seen
+        if seen and stamp_ns <= seen[-1][0]:
+            seen.clear()
+            self._due_ns = 0
+        seen.append((stamp_ns, here, there))
+        while (span_ns := stamp_ns - seen[0][0]) > _WINDOW_NS:
+            seen.popleft()
+        if stamp_ns < self._due_ns or span_ns < 0.9 * _WINDOW_NS:
+            return
+        self._due_ns = stamp_ns + _EVERY_NS
+        _, first, other = zip(*seen, strict=True)
+        period_ns = span_ns / (len(seen) - 1)
+        lag = lag_of(np.array(first), np.array(other), round(_MOST_NS / period_ns))
+        if lag is not None:
+            self.verdict.see(lag * period_ns / 1e9 if abs(lag) > 1 else 0.0)
+
+    def remark(self, name: str) -> str:
+        """Return a warning that a camera of this name is late or early; empty if it is not."""
+        is_late = any(lag_s > 0.0 for lag_s in self.verdict.medians)
+        return self.verdict.remark(name=name, than="later" if is_late else "earlier")
+
+
+def lag_of(here: FloatArray, there: FloatArray, most: int) -> int | None:
+    """Return by how many images the second series (N, n) is late; None if no motion shows it."""
+    alike = {lag: _correlation(here, there, lag) for lag in range(-most, most + 1)}
+    best = max(alike, key=lambda lag: alike[lag])
+    is_clear = alike[best] > _LEAST and (best == 0 or alike[best] > alike[0] + _MORE)
+    return best if is_clear else None
+
+
+def _correlation(here: FloatArray, there: FloatArray, lag: int) -> float:
+    end = len(here) - abs(lag)
+    one, two = here[max(-lag, 0) :][:end], there[max(lag, 0) :][:end]
+    known = np.isfinite(one) & np.isfinite(two)
+    if np.count_nonzero(known) < _FEWEST:
+        return -1.0
+    moved = []
+    for series in (one, two):
+        of = np.where(known, series, 0.0)
+        of -= known * (of.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
+        moved.append(of)
+    power = np.linalg.norm(moved[0]) * np.linalg.norm(moved[1])
+    return float(np.sum(moved[0] * moved[1]) / max(power, 1e-12))

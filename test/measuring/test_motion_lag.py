@@ -1,0 +1,41 @@
+"""The lag between two cameras by the motion of the person."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cardbox_tracker.measuring.motion_lag import MotionLag, lag_of
+
+RNG = np.random.default_rng(3)
+MOVES = np.cumsum(RNG.normal(0.0, 0.1, (60, 5)), axis=0)
+
+
+@pytest.mark.parametrize("lag", [-4, 0, 3, 7])
+def test_the_lag_of_motions_is_found_where_some_joints_are_unknown(lag: int) -> None:
+    here, there = MOVES[10:50].copy(), MOVES[10 - lag : 50 - lag].copy()
+    here[5:20, 1] = np.nan
+    there[10:25, 2] = np.nan
+    assert lag_of(here, there, 8) == lag
+
+
+def test_who_stands_or_moves_slowly_or_otherwise_shows_no_lag() -> None:
+    still = RNG.normal(0.0, 0.001, (2, 40, 5))
+    assert lag_of(*still, 8) is None
+    slow = np.linspace(0.0, 1.0, 48)[:, None]
+    assert lag_of(slow[8:], slow[:-8], 8) is None
+    assert lag_of(MOVES[:40], -MOVES[20:], 8) is None
+    assert lag_of(np.full((40, 5), np.nan), MOVES[:40], 8) is None
+
+
+def test_a_lag_lasts_while_nobody_moves_and_ends_with_the_clock() -> None:
+    lag, told = MotionLag(), []
+    for i in range(300):
+        # They move, then stand.
+        here, there = MOVES[min(i, 59) % 60], MOVES[max(min(i, 59) - 6, 0)]
+        lag.add(i * 50_000_000, here, there)
+        told.append(lag.verdict.holds)
+    assert not any(told[:36]) and all(told[50:])
+    assert "0.3 s later" in lag.remark("cam1")
+    lag.add(0, MOVES[0], MOVES[0])
+    assert len(lag._seen) == 1
