@@ -73,9 +73,9 @@ def test_the_rotation_of_each_image_is_found(motion: str) -> None:
     assert found.largest_rad == pytest.approx(max(map(angle_of, turns)), abs=1e-3)
 
 
-@pytest.mark.parametrize(("motion", "guessed"), [("shake", 1.4), ("pan", 0.6), ("pan", 1.0)])
+@pytest.mark.parametrize(("motion", "guessed"), [("shake", 1.4), ("pan", 0.6)])
 def test_the_turns_show_the_lens(motion: str, guessed: float) -> None:
-    turns = [turned(MOTIONS[motion](time_s)) for time_s in TIMES_S[::2]]
+    turns = [turned(MOTIONS[motion](time_s)) for time_s in TIMES_S[::3]]
     frames = [(image, person) for _, image, person in film(wall(), views(turns))]
     other = replace(CAMERA, fx=guessed * CAMERA.fx, fy=guessed * CAMERA.fy)
     found = turning_lens(frames, other)
