@@ -341,6 +341,9 @@ class ArmFollower:
         )
         width = np.minimum(self._high - self._low, 2 * np.pi)
         self._starts = np.vstack([rest, rest + width * (random.random((_STARTS, count)) - 0.5)])
+        # The first solution loads compiled code, which takes longer than a robot waits.
+        wanted = self.kinematics.directions(rest)
+        self._solved(rest, wanted[2] if self._is_hand else wanted)
 
     def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
         """See :class:`~.retargeter.Method`."""

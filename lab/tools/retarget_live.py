@@ -1,0 +1,275 @@
+"""Measure how robots follow recorded people live, through the real nodes.
+
+python -m lab.tools.retarget_live --robot URDF [--robot URDF ...] SESSION...
+
+The images of a session come in real time to ``detector`` and ``tracker``, which know stature and
+pitch, and to a node ``retarget`` with its defaults for each robot. A simulated robot goes where it
+is sent and tells where it is. The motions are played forwards and backwards in turn, so that nobody
+jumps. ``--write`` replaces the table in ``docs/retargeting.md``; its figures change from run to run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import signal
+import struct
+import sys
+import tempfile
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from sensor_msgs.msg import CameraInfo, JointState
+from std_msgs.msg import String
+from std_srvs.srv import SetBool
+
+from cardbox_tracker.applications.retargeting.arm import ArmFollower, directions_of
+from cardbox_tracker.applications.retargeting.config import RetargetConfig
+from cardbox_tracker.applications.retargeting.robot import load_robot
+from cardbox_tracker.camera.camera import level_to_optical
+from cardbox_tracker.common.files import write_file
+from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import (
+    JOINT_NAMES,
+    KEYPOINT_NAMES,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+)
+from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
+from cardbox_tracker.recordings.bag_writer import BagWriter
+from cardbox_tracker.recordings.result_reader import Results
+from cardbox_tracker.ros.runtime import qos
+from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate
+from lab.pages import replaced, row, table
+from lab.tools.retarget_accuracy import DOCUMENT, degrees_between
+from lab.tools.way_cases import Case, cases_of
+from lab.tools.way_nodes import live
+
+BEGIN, END = "<!-- retarget-live:begin -->", "<!-- retarget-live:end -->"
+_HEAD = (
+    *("recording", "robot", "begins after", "behind what is tracked", "behind the person", "lag"),
+    *("largest step", "follows", "changes", "faults"),
+)
+_LENGTH_S, _AT_ONCE = 60.0, 2
+# Time constant of the robot's actuators, and the period in which it tells where it is, s.
+_ACTUATOR_S, _PERIOD_S = 0.05, 0.02
+_LAGS_S = np.arange(0.0, 1.0, 0.01)
+_INPUTS = "joint_states", "joint_states_stddev", "tracking_state", "body_model", "keypoint_states"
+
+
+def repeated(case: Case, path: Path) -> tuple[Case, dict[int, int]]:
+    """Write the motions of a case's camera to a bag for a minute, forwards and backwards in turn.
+
+    Returns the case with this bag, and the recorded stamp of each of its stamps, ns.
+    """
+    with BagReader(case.bag) as bag, BagWriter(path) as out:
+        images, infos = bag.image_topic(case.cameras[0]), bag.camera_info_topic(case.cameras[0])
+        start_ns = bag.start_ns + round(case.start_s * 1e9)
+        shown: dict[int, list[Any]] = {}
+        for message in bag.messages([images, infos]):
+            if message.time_ns >= start_ns:
+                shown.setdefault(message.time_ns, []).append(message)
+        stamps = sorted(shown)
+        period_ns = (stamps[-1] - stamps[0]) // (len(stamps) - 1)
+        found: dict[int, int] = {}
+        for number in range(round(_LENGTH_S * 1e9) // period_ns):
+            there = number % (2 * len(stamps) - 2)
+            old_ns = stamps[min(there, 2 * len(stamps) - 2 - there)]
+            new_ns = stamps[0] + number * period_ns
+            found[new_ns] = old_ns
+            for one in shown[old_ns]:
+                # In CDR, the stamp of the header is behind four bytes.
+                stamp = struct.pack("<iI", *divmod(new_ns, 10**9))
+                raw = bytes(one.raw[:4]) + stamp + bytes(one.raw[12:])
+                out.write_raw(one.topic, one.msgtype, raw, new_ns)
+    return replace(case, bag=path, empty=None), found
+
+
+class _Robot:
+    """A simulated robot, which goes where its node ``retarget`` sends it, and what came of it."""
+
+    def __init__(self, path: Path, nodes: Nodes, node: Any, space: str) -> None:
+        """Start its node, and subscribe to it with ``node``; the tracker is in ``space``."""
+        self.name, self._robot = path.stem, load_robot(path)
+        own = f"/{self.name}"
+        words = [f"{own}/{one}:={space}/{one}" for one in (*_INPUTS, "hands")]
+        inputs = [word for one in words for word in ("-r", one)]
+        nodes.start(
+            *("retarget", "--ros-args", "-r", f"__ns:={own}", "-p", f"robot_file:={path}", *inputs),
+            called=f"retarget_{self.name}",
+        )
+        self.status_topic = f"{own}/retarget/status"
+        self.said: list[tuple[float, str]] = []
+        self.sent: list[tuple[float, FloatArray]] = []
+        self.way: list[tuple[float, FloatArray]] = []
+        self.follower = ArmFollower(self._robot, RetargetConfig())
+        self._at = self._robot.positions_of("start", "", self.follower.joints, 0.0)
+        self._tells = node.create_publisher(
+            JointState, f"{own}/retarget/robot_joint_states", qos.LATEST
+        )
+        self._enable = node.create_client(SetBool, f"{own}/retarget/enable")
+        node.create_subscription(String, self.status_topic, self._on_status, qos.LATCHED)
+        node.create_subscription(
+            JointState, f"{own}/retarget/joint_states", self._on_command, qos.REPLAY
+        )
+        node.create_timer(_PERIOD_S, self._tick)
+
+    def _on_status(self, message: String) -> None:
+        self.said.append((time.monotonic(), message.data))
+        # Somebody is there who enables it anew.
+        if message.data.startswith(("disabled", "faulted")):
+            self._enable.call_async(SetBool.Request(data=True))
+
+    def _on_command(self, message: JointState) -> None:
+        by_name = dict(zip(message.name, message.position, strict=True))
+        positions = np.array([by_name[name] for name in self.follower.joints])
+        self.sent.append((time.monotonic(), positions))
+
+    def _tick(self) -> None:
+        now_s = time.monotonic()
+        if self.sent:
+            passed_s = now_s - self.way[-1][0] if self.way else 0.0
+            self._at = self._at + (self.sent[-1][1] - self._at) * -np.expm1(-passed_s / _ACTUATOR_S)
+        self.way.append((now_s, self._at))
+        self._tells.publish(JointState(name=list(self.follower.joints), position=list(self._at)))
+
+    def directions(self, at_s: FloatArray) -> FloatArray:
+        """Return shoulder to hand (..., 3) in the person's torso at times of the clock."""
+        times, way = zip(*self.way, strict=True)
+        at = np.stack([np.interp(at_s, times, one) for one in np.transpose(way)], axis=-1)
+        arm = at[..., : len(self.follower.arm.joints)].reshape(len(at_s.ravel()), -1)
+        found = [self.follower.kinematics.directions(one)[2] for one in arm]
+        return (np.array(found) @ self.follower.mount.T).reshape(*at_s.shape, 3)
+
+    def largest_step(self) -> float:
+        """Return the largest step between two commands, of that which the limit of speed allows."""
+        config = RetargetConfig()
+        speed = np.minimum(self._robot.limits_of(self.follower.joints)[2], config.max_speed)
+        steps = np.abs(np.diff([one for _, one in self.sent], axis=0))
+        return float((steps / speed).max() * config.rate_hz)
+
+    def states(self, at_s: FloatArray) -> list[str]:
+        """Return the status at times of the clock."""
+        times, texts = zip(*self.said, strict=True)
+        return [texts[max(i, 0)] for i in np.searchsorted(times, at_s) - 1]
+
+
+def true_directions(case: Case, results: Results, recorded: dict[int, int]) -> FloatArray:
+    """Return the right hand of each result from its shoulder, as it is, in the tracked torso.
+
+    Shape (n, 3), of length 1; nan where it is not known.
+    """
+    to_level = level_to_optical(np.radians(case.pitch_deg))
+    shoulder, hand = (KEYPOINT_NAMES.index(f"right_{one}") for one in ("shoulder", "hand"))
+    torso = [f"torso_{one}" for one in ("roll", "pitch", "yaw")]
+    found = np.full((len(results.stamp_ns), 3), np.nan)
+    for number, (stamp_ns, angles) in enumerate(
+        zip(results.stamp_ns.tolist(), results.of(torso), strict=True)
+    ):
+        joints = case.people[0].joints_m.get(recorded.get(stamp_ns, -1))
+        if joints is not None:
+            roll, pitch, yaw = angles
+            bone = (joints[hand] - joints[shoulder]) @ to_level
+            bone = bone @ rotation_z(yaw) @ rotation_y(pitch) @ rotation_x(roll)
+            found[number] = bone / np.linalg.norm(bone)
+    return found
+
+
+def measured(case: Case, paths: Sequence[Path], folder: Path) -> list[str]:
+    """Return the rows of robots that follow the person of a case at the same time."""
+    played, recorded = repeated(case, folder / "played")
+    robots: list[_Robot] = []
+    came: dict[int, float] = {}
+    with BagReader(played.bag) as bag:
+        info = bag.camera_info_topic(case.cameras[0])
+
+    def further(nodes: Nodes, node: Any, space: str) -> list[str]:
+        node.create_subscription(
+            *(CameraInfo, info, lambda one: came.update({stamp_ns_of(one): time.monotonic()})),
+            qos.REPLAY,
+        )
+        robots.extend(_Robot(path, nodes, node, space) for path in paths)
+        return [robot.status_topic for robot in robots]
+
+    (results,) = live(played, folder, 1.0, further)
+    print(case.name, f"{len(results.stamp_ns) / _LENGTH_S:.1f} images a second")
+    true = true_directions(case, results, recorded)
+    postures, shown = results.of(JOINT_NAMES), np.array([came[s] for s in results.stamp_ns.tolist()])
+    tracked = np.array(
+        [
+            np.full(3, np.nan) if body is None else directions_of(body, one, "right")[2]
+            for body, one in zip(results.bodies, postures, strict=True)
+        ]
+    )
+    return [_row(case, robot, came, recorded, shown, tracked, true) for robot in robots]
+
+
+def _row(
+    case: Case,
+    robot: _Robot,
+    came: dict[int, float],
+    recorded: dict[int, int],
+    shown: FloatArray,
+    tracked: FloatArray,
+    true: FloatArray,
+) -> str:
+    first_s = next(at_s for at_s, text in robot.said if text == "following")
+    begun_s = first_s + RetargetConfig().soft_start_s
+    later = shown >= begun_s
+    found = robot.directions(shown[later, None] + _LAGS_S)
+    off = degrees_between(found, tracked[later, None])
+    behind = [off[:, 0], degrees_between(found[:, 0], true[later])]
+    shares = ("{:.0f} / {:.0f}°".format(*np.nanpercentile(one, (50, 90))) for one in behind)
+    lag_s = float(_LAGS_S[np.nanmedian(off, axis=0).argmin()])
+    # Of images with a 3D reference, in which the person is seen well.
+    joints = case.people[0].joints_m
+    seen = np.array([at for stamp, at in came.items() if recorded[stamp] in joints and at > first_s])
+    phases = [one.partition(":")[0] for one in robot.states(seen)]
+    said = [text for at_s, text in robot.said if at_s > first_s]
+    for (from_s, text), (to_s, _) in pairwise([*robot.said, (max(came.values()), "")]):
+        if text != "following" and from_s > first_s:
+            print(f"  {robot.name}: {from_s - first_s:.2f} s, for {to_s - from_s:.2f} s: {text}")
+    return row(
+        (
+            *(case.name, robot.name, f"{first_s - min(came.values()):.1f} s", *shares),
+            *(f"{lag_s:.2f} s", f"{robot.largest_step():.0%}"),
+            f"{phases.count('following') / len(phases):.1%}",
+            *(len(said), sum(text.startswith("faulted") for text in said)),
+        )
+    )
+
+
+def main() -> int:
+    """Measure and print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("sessions", nargs="+", type=Path, metavar="SESSION")
+    parser.add_argument("--robot", action="append", type=Path, metavar="URDF", required=True)
+    parser.add_argument("--write", action="store_true", help="write the table into the document")
+    given = parser.parse_args()
+    # Nodes are stopped on the way out.
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    os.environ.setdefault("PYTHONPATH", str(Path(__file__).parents[2]))
+    isolate()
+    compile_kernels()
+    rows = [table(_HEAD, ())]
+    for session in given.sessions:
+        case = next(cases_of(session))
+        for number in range(0, len(given.robot), _AT_ONCE):
+            with tempfile.TemporaryDirectory() as name:
+                found = measured(case, given.robot[number : number + _AT_ONCE], Path(name))
+            rows += found
+            print(*found, sep="\n", flush=True)
+    if given.write:
+        text = DOCUMENT.read_text(encoding="utf-8")
+        write_file(DOCUMENT, replaced(text, "\n" + "\n".join(rows) + "\n", BEGIN, END))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
