@@ -64,11 +64,14 @@ class Method(Protocol):
     def joints(self) -> tuple[str, ...]:
         """Names of the robot's joints that are moved."""
 
-    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, body: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         """Return target positions (n,) of the joints for a posture with head and hands, (16,).
 
         ``now`` (n,) are the current positions. What is not known of head and hands is nan. The
-        target may be beyond the joint limits; it is nan if there is no solution.
+        target may be beyond the joint limits; it is nan if there is no solution. With ``begins``,
+        movements are followed from this posture and these positions on, if with a clutch.
         """
 
     def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
@@ -325,12 +328,16 @@ class Retargeter:
             return self._stop("too uncertain", now_ns)
         whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
         point = self._motion.set_point(now_ns)
-        target = np.where(held, point, self._method.target(body, whole, point))
+        begins = self._followed_ns is None
+        target = np.where(held, point, self._method.target(body, whole, point, begins))
         if not np.isfinite(target).all():
             return self._stop("no solution", now_ns)
         if self._followed_ns is None:
             self._followed_ns = now_ns
-            self._offset = point - target if self._config.clutch else np.zeros(len(target))
+            # A gripper opens or closes, and a hand that is followed alone began where it is.
+            is_moved = np.isinf(self.tolerance) | self._places.any(axis=1)
+            is_moved |= not self._config.clutch
+            self._offset = np.where(is_moved, 0.0, point - target)
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
         longest_ns = round(self._config.longest_step_s * 1e9)
@@ -361,10 +368,13 @@ class Retargeter:
         sure = np.isfinite(given).all(axis=0) & self._tracked(_ENDS, keypoints)
         angles, spread = np.where(sure, given, 0.0)
         bent, shaking = angles[_FLEXIONS], spread[_FLEXIONS]
-        # The root of the mean square of the cosine, in which the abduction turns the limb.
+        # The root of the mean square of the cosine, in which the abduction turns the limb, and that
+        # of the chord of the turn: an angle that is not known at all leaves the limb on a cone.
         turned = np.minimum(np.hypot(np.cos(bent), shaking * np.sin(bent)), 1.0)
+        turned *= np.sqrt(-2.0 * np.expm1(-0.5 * np.clip(spread[_ABDUCTIONS], -9, 9) ** 2))
         spreads = np.tile(spread, (len(self._sources), 1))
-        spreads[:, _ABDUCTIONS] *= np.where(self._sources[:, _FLEXIONS], turned, 1.0)
+        both = self._sources[:, _FLEXIONS]
+        spreads[:, _ABDUCTIONS] = np.where(both, turned, spread[_ABDUCTIONS])
         is_held = self._sources & ~(sure & (spreads <= self._config.max_stddev_rad))
         is_lost = self._places & ~self._tracked(KEYPOINT_NAMES, keypoints)
         return np.asarray(is_held.any(axis=1) | is_lost.any(axis=1))
@@ -392,9 +402,11 @@ class _Together:
             )
         self._ends = np.cumsum([len(one.joints) for one in parts])[:-1]
 
-    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, body: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         parts = zip(self._parts, np.split(now, self._ends), strict=True)
-        return np.concatenate([one.target(body, posture, part) for one, part in parts])
+        return np.concatenate([one.target(body, posture, part, begins) for one, part in parts])
 
     def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
         split = (np.split(one, self._ends) for one in (positions, now))

@@ -218,15 +218,17 @@ def test_the_dead_man(state: str, deviation: float, status: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flexion_deg", "moves"), [(88.0, True), (30.0, False)], ids=["along the axis", "across"]
+    ("flexion_deg", "spread_rad", "moves"),
+    [(88.0, 1.8, True), (72.0, 4.0, True), (30.0, 1.8, False)],
+    ids=["along the axis", "on a narrow cone", "across"],
 )
 def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
-    flexion_deg: float, moves: bool
+    flexion_deg: float, spread_rad: float, moves: bool
 ) -> None:
     """A forearm straight ahead is known, and its abduction is not."""
     posture, stddev = np.zeros(12), SURE.copy()
     posture[JOINT_NAMES.index("right_elbow_flexion")] = np.radians(flexion_deg)
-    stddev[JOINT_NAMES.index("right_elbow_abduction")] = 1.8
+    stddev[JOINT_NAMES.index("right_elbow_abduction")] = spread_rad
     _, robot, _ = make_retargeter(CONFIG / "example_arm.urdf", None, RetargetConfig())
     assert robot.update(0, "tracking", BODY, posture, stddev).is_moving == moves
     # What follows the abduction alone needs it.
