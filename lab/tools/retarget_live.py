@@ -5,7 +5,8 @@ python -m lab.tools.retarget_live --robot URDF [--robot URDF ...] SESSION...
 The images of a session come in real time to ``detector`` and ``tracker``, which know stature and
 pitch, and to a node ``retarget`` with its defaults for each robot. A simulated robot goes where it
 is sent and tells where it is. The motions are played forwards and backwards in turn, so that nobody
-jumps. ``--write`` replaces the table in ``docs/retargeting.md``; its figures change from run to run.
+jumps. ``--write`` replaces the table in ``docs/retargeting.md``. Its figures change from run to run,
+and are worse where other programs take the processor.
 """
 
 from __future__ import annotations
@@ -200,7 +201,8 @@ def measured(case: Case, paths: Sequence[Path], folder: Path) -> list[str]:
     (results,) = live(played, folder, 1.0, further)
     print(case.name, f"{len(results.stamp_ns) / _LENGTH_S:.1f} images a second")
     true = true_directions(case, results, recorded)
-    postures, shown = results.of(JOINT_NAMES), np.array([came[s] for s in results.stamp_ns.tolist()])
+    postures = results.of(JOINT_NAMES)
+    shown = np.array([came[stamp_ns] for stamp_ns in results.stamp_ns.tolist()])
     tracked = np.array(
         [
             np.full(3, np.nan) if body is None else directions_of(body, one, "right")[2]
@@ -228,8 +230,8 @@ def _row(
     shares = ("{:.0f} / {:.0f}°".format(*np.nanpercentile(one, (50, 90))) for one in behind)
     lag_s = float(_LAGS_S[np.nanmedian(off, axis=0).argmin()])
     # Of images with a 3D reference, in which the person is seen well.
-    joints = case.people[0].joints_m
-    seen = np.array([at for stamp, at in came.items() if recorded[stamp] in joints and at > first_s])
+    known = {new_ns for new_ns, old_ns in recorded.items() if old_ns in case.people[0].joints_m}
+    seen = np.array([at_s for stamp, at_s in came.items() if stamp in known and at_s > first_s])
     phases = [one.partition(":")[0] for one in robot.states(seen)]
     said = [text for at_s, text in robot.said if at_s > first_s]
     for (from_s, text), (to_s, _) in pairwise([*robot.said, (max(came.values()), "")]):
