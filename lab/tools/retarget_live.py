@@ -5,8 +5,8 @@ python -m lab.tools.retarget_live --robot URDF [--robot URDF ...] SESSION...
 The images of a session come in real time to ``detector`` and ``tracker``, which know stature and
 pitch, and to a node ``retarget`` with its defaults for each robot. A simulated robot goes where it
 is sent and tells where it is. The motions are played forwards and backwards in turn, so that nobody
-jumps. ``--write`` replaces the table in ``docs/retargeting.md``. Its figures change from run to run,
-and are worse where other programs take the processor.
+jumps. ``--write`` replaces the table in ``docs/retargeting.md``. Its figures change from run to
+run, and are worse where other programs take the processor.
 """
 
 from __future__ import annotations
