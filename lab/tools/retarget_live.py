@@ -20,7 +20,7 @@ import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import pairwise
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -54,7 +54,7 @@ from lab.tools.way_nodes import live
 
 BEGIN, END = "<!-- retarget-live:begin -->", "<!-- retarget-live:end -->"
 _HEAD = (
-    *("recording", "robot", "begins after", "behind what is tracked", "behind the person", "lag"),
+    *("recording", "robot", "postures", "behind what is tracked", "behind the person", "lag"),
     *("largest step", "follows", "changes", "faults"),
 )
 _LENGTH_S, _AT_ONCE = 60.0, 2
@@ -123,6 +123,9 @@ class _Robot:
 
     def _on_status(self, message: String) -> None:
         self.said.append((time.monotonic(), message.data))
+        if message.data.startswith("ready") and self.sent:
+            # It begins anew where the robot is, which is no step.
+            self.sent.append((time.monotonic(), np.full(len(self._at), np.nan)))
         # Somebody is there who enables it anew.
         if message.data.startswith(("disabled", "faulted")):
             self._enable.call_async(SetBool.Request(data=True))
@@ -134,8 +137,8 @@ class _Robot:
 
     def _tick(self) -> None:
         now_s = time.monotonic()
-        if self.sent:
-            passed_s = now_s - self.way[-1][0] if self.way else 0.0
+        if self.sent and np.isfinite(self.sent[-1][1]).all():
+            passed_s = now_s - self.way[-1][0]
             self._at = self._at + (self.sent[-1][1] - self._at) * -np.expm1(-passed_s / _ACTUATOR_S)
         self.way.append((now_s, self._at))
         self._tells.publish(JointState(name=list(self.follower.joints), position=list(self._at)))
@@ -153,12 +156,32 @@ class _Robot:
         config = RetargetConfig()
         speed = np.minimum(self._robot.limits_of(self.follower.joints)[2], config.max_speed)
         steps = np.abs(np.diff([one for _, one in self.sent], axis=0))
-        return float((steps / speed).max() * config.rate_hz)
+        return float(np.nanmax(steps / speed) * config.rate_hz)
 
-    def states(self, at_s: FloatArray) -> list[str]:
-        """Return the status at times of the clock."""
+    def cells(
+        self, seen_s: FloatArray, shown_s: FloatArray, tracked: FloatArray, true: FloatArray
+    ) -> list[object]:
+        """Return what the table says of the robot from its first following on.
+
+        ``seen_s`` are the times of images with a 3D reference, in which the person is seen well,
+        ``shown_s`` (n,) those of images that were tracked, with the directions from shoulder to
+        hand (n, 3) that were found and that are true.
+        """
         times, texts = zip(*self.said, strict=True)
-        return [texts[max(i, 0)] for i in np.searchsorted(times, at_s) - 1]
+        first = texts.index("following")
+        later = shown_s >= times[first] + RetargetConfig().soft_start_s
+        found = self.directions(shown_s[later, None] + _LAGS_S)
+        off = degrees_between(found, tracked[later, None])
+        behind = [off[:, 0], degrees_between(found[:, 0], true[later])]
+        shares = ("{:.0f} / {:.0f}°".format(*np.nanpercentile(one, (50, 90))) for one in behind)
+        lag_s = float(_LAGS_S[np.nanmedian(off, axis=0).argmin()])
+        at = np.searchsorted(times, seen_s[seen_s > times[first]]) - 1
+        follows = np.mean([texts[i] == "following" for i in at])
+        # The last image is followed by a fault.
+        changes = texts[first + 1 : np.searchsorted(times, seen_s[-1])]
+        faults = sum(text.startswith("faulted") for text in changes)
+        step = f"{self.largest_step():.0%}"
+        return [*shares, f"{lag_s:.2f} s", step, f"{follows:.1%}", len(changes), faults]
 
 
 def true_directions(case: Case, results: Results, recorded: dict[int, int]) -> FloatArray:
@@ -187,19 +210,27 @@ def measured(case: Case, paths: Sequence[Path], folder: Path) -> list[str]:
     played, recorded = repeated(case, folder / "played")
     robots: list[_Robot] = []
     came: dict[int, float] = {}
+    known: dict[int, float] = {}
     with BagReader(played.bag) as bag:
         info = bag.camera_info_topic(case.cameras[0])
 
     def further(nodes: Nodes, node: Any, space: str) -> list[str]:
-        node.create_subscription(
-            *(CameraInfo, info, lambda one: came.update({stamp_ns_of(one): time.monotonic()})),
-            qos.REPLAY,
-        )
+        for kind, topic, times in (
+            (CameraInfo, info, came),
+            (JointState, f"{space}/joint_states_stddev", known),
+        ):
+            take = partial(
+                lambda times, one: times.update({stamp_ns_of(one): time.monotonic()}), times
+            )
+            node.create_subscription(kind, topic, take, qos.REPLAY)
         robots.extend(_Robot(path, nodes, node, space) for path in paths)
         return [robot.status_topic for robot in robots]
 
     (results,) = live(played, folder, 1.0, further)
-    print(case.name, f"{len(results.stamp_ns) / _LENGTH_S:.1f} images a second")
+    seconds = sorted(known.values())
+    rate_hz = (len(seconds) - 1) / (seconds[-1] - seconds[0])
+    late_s = np.median([at_s - came[stamp_ns] for stamp_ns, at_s in known.items()])
+    of_tracker = f"{rate_hz:.0f} Hz, {late_s:.2f} s"
     true = true_directions(case, results, recorded)
     postures = results.of(JOINT_NAMES)
     shown = np.array([came[stamp_ns] for stamp_ns in results.stamp_ns.tolist()])
@@ -209,42 +240,12 @@ def measured(case: Case, paths: Sequence[Path], folder: Path) -> list[str]:
             for body, one in zip(results.bodies, postures, strict=True)
         ]
     )
-    return [_row(case, robot, came, recorded, shown, tracked, true) for robot in robots]
-
-
-def _row(
-    case: Case,
-    robot: _Robot,
-    came: dict[int, float],
-    recorded: dict[int, int],
-    shown: FloatArray,
-    tracked: FloatArray,
-    true: FloatArray,
-) -> str:
-    first_s = next(at_s for at_s, text in robot.said if text == "following")
-    begun_s = first_s + RetargetConfig().soft_start_s
-    later = shown >= begun_s
-    found = robot.directions(shown[later, None] + _LAGS_S)
-    off = degrees_between(found, tracked[later, None])
-    behind = [off[:, 0], degrees_between(found[:, 0], true[later])]
-    shares = ("{:.0f} / {:.0f}°".format(*np.nanpercentile(one, (50, 90))) for one in behind)
-    lag_s = float(_LAGS_S[np.nanmedian(off, axis=0).argmin()])
-    # Of images with a 3D reference, in which the person is seen well.
-    known = {new_ns for new_ns, old_ns in recorded.items() if old_ns in case.people[0].joints_m}
-    seen = np.array([at_s for stamp, at_s in came.items() if stamp in known and at_s > first_s])
-    phases = [one.partition(":")[0] for one in robot.states(seen)]
-    said = [text for at_s, text in robot.said if at_s > first_s]
-    for (from_s, text), (to_s, _) in pairwise([*robot.said, (max(came.values()), "")]):
-        if text != "following" and from_s > first_s:
-            print(f"  {robot.name}: {from_s - first_s:.2f} s, for {to_s - from_s:.2f} s: {text}")
-    return row(
-        (
-            *(case.name, robot.name, f"{first_s - min(came.values()):.1f} s", *shares),
-            *(f"{lag_s:.2f} s", f"{robot.largest_step():.0%}"),
-            f"{phases.count('following') / len(phases):.1%}",
-            *(len(said), sum(text.startswith("faulted") for text in said)),
-        )
-    )
+    seen = {new_ns for new_ns, old_ns in recorded.items() if old_ns in case.people[0].joints_m}
+    seen_s = np.array([at_s for stamp_ns, at_s in came.items() if stamp_ns in seen])
+    return [
+        row((case.name, robot.name, of_tracker, *robot.cells(seen_s, shown, tracked, true)))
+        for robot in robots
+    ]
 
 
 def main() -> int:

@@ -263,6 +263,7 @@ class Retargeter:
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
         self._offset = np.zeros(len(method.joints))
+        self._target, self._sure_ns = self._offset, np.full(len(method.joints), -np.inf)
 
     def begin(self, positions: FloatArray) -> None:
         """Stand still at the robot's ``positions`` (n,); the next image counts as the first."""
@@ -323,13 +324,18 @@ class Retargeter:
         if body is None:
             return self._stop("no body model", now_ns)
         held = self._held(posture, stddev, keypoints or {})
+        begins, longest_ns = self._followed_ns is None, round(self._config.longest_step_s * 1e9)
+        # An unsure image soon after a sure one is as one that is missing.
+        self._sure_ns = np.where(held, self._sure_ns, now_ns)
+        waits = held & (now_ns - self._sure_ns <= longest_ns) & (not begins)
+        held &= ~waits
         is_blind = self._follows.any() and held[self._follows].all()
         if is_blind or not np.isfinite(posture[:N_JOINTS]).all():
             return self._stop("too uncertain", now_ns)
         whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
         point = self._motion.set_point(now_ns)
-        begins = self._followed_ns is None
         target = np.where(held, point, self._method.target(body, whole, point, begins))
+        target = self._target = np.where(waits, self._target, target)
         if not np.isfinite(target).all():
             return self._stop("no solution", now_ns)
         if self._followed_ns is None:
@@ -340,7 +346,6 @@ class Retargeter:
             self._offset = np.where(is_moved, 0.0, point - target)
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
-        longest_ns = round(self._config.longest_step_s * 1e9)
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0

@@ -208,7 +208,7 @@ def test_of_a_hand_that_is_followed_alone_its_keypoint_decides(
     ],
 )
 def test_the_dead_man(state: str, deviation: float, status: str) -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig())
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(longest_step_s=0.05))
     posture = reference_posture("arms")
     follow(robot, 5)
     assert robot.update(5 * 10**8, state, BODY, posture, np.full(12, deviation)).status == status
@@ -235,6 +235,24 @@ def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
     only = replace(MAP, angles=tuple("right_elbow_abduction" for _ in MAP.angles))
     single = Retargeter(ROBOT, only, RetargetConfig())
     assert not single.update(0, "tracking", BODY, posture, stddev).is_moving
+
+
+def test_an_unsure_image_is_as_one_that_is_missing() -> None:
+    """The arm goes on to where it was last sure, for the longest step; then it holds."""
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=0.0))
+    there, elsewhere = np.zeros(12), np.zeros(12)
+    number = JOINT_NAMES.index("right_shoulder_flexion")
+    there[number], elsewhere[number] = 0.5, -0.5
+    unsure = np.full(12, 2.0)
+    said = []
+    for tenth in range(9):
+        sure = tenth in (0, 1, 4)
+        now = there if sure else elsewhere
+        command = robot.update(tenth * 10**8, "tracking", BODY, now, SURE if sure else unsure)
+        said.append(command.status)
+    assert said == ["following"] * 7 + ["holding: too uncertain"] * 2
+    moved = [robot.at(tenth * 10**8).positions[1] for tenth in (1, 5, 9, 20)]
+    assert moved == sorted(moved, reverse=True) and moved[-1] == pytest.approx(-0.5)
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:

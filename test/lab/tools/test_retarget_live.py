@@ -57,9 +57,7 @@ def test_the_true_hand_is_seen_from_the_tracked_torso() -> None:
     turned = {"torso_roll": 0.0, "torso_pitch": 0.0, "torso_yaw": 0.5}
     numbers = {name: np.full(2, value) for name, value in turned.items()}
     stamps = np.array([S, 2 * S])
-    results = Results(
-        Path(), stamps, stamps / S, ("tracking",) * 2, numbers, {}, (None,) * 2
-    )
+    results = Results(Path(), stamps, stamps / S, ("tracking",) * 2, numbers, {}, (None,) * 2)
     given = case(Path(), Person("", 1.75, {7: points}))
     found = retarget_live.true_directions(given, results, {S: 7, 2 * S: 8})
     np.testing.assert_allclose(found, [[1.0, 0.0, 0.0], [np.nan] * 3], atol=1e-9)
