@@ -21,6 +21,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -55,12 +56,12 @@ from lab.tools.way_nodes import live
 BEGIN, END = "<!-- retarget-live:begin -->", "<!-- retarget-live:end -->"
 _HEAD = (
     *("recording", "robot", "postures", "behind what is tracked", "behind the person", "lag"),
-    *("largest step", "follows", "changes", "faults"),
+    *("commands", "largest step", "follows", "changes", "faults"),
 )
 _LENGTH_S, _AT_ONCE = 60.0, 2
 # Time constant of the robot's actuators, and the period in which it tells where it is, s.
 _ACTUATOR_S, _PERIOD_S = 0.05, 0.02
-_LAGS_S = np.arange(0.0, 1.0, 0.01)
+_LAGS_S, _NEAR_S = np.arange(0.0, 1.5, 0.02), 1.0
 _INPUTS = "joint_states", "joint_states_stddev", "tracking_state", "body_model", "keypoint_states"
 
 
@@ -123,9 +124,6 @@ class _Robot:
 
     def _on_status(self, message: String) -> None:
         self.said.append((time.monotonic(), message.data))
-        if message.data.startswith("ready") and self.sent:
-            # It begins anew where the robot is, which is no step.
-            self.sent.append((time.monotonic(), np.full(len(self._at), np.nan)))
         # Somebody is there who enables it anew.
         if message.data.startswith(("disabled", "faulted")):
             self._enable.call_async(SetBool.Request(data=True))
@@ -137,7 +135,7 @@ class _Robot:
 
     def _tick(self) -> None:
         now_s = time.monotonic()
-        if self.sent and np.isfinite(self.sent[-1][1]).all():
+        if self.sent and self.way:
             passed_s = now_s - self.way[-1][0]
             self._at = self._at + (self.sent[-1][1] - self._at) * -np.expm1(-passed_s / _ACTUATOR_S)
         self.way.append((now_s, self._at))
@@ -152,11 +150,18 @@ class _Robot:
         return (np.array(found) @ self.follower.mount.T).reshape(*at_s.shape, 3)
 
     def largest_step(self) -> float:
-        """Return the largest step between two commands, of that which the limit of speed allows."""
+        """Return the largest step between two commands, of that which the limit of speed allows.
+
+        Not when it begins to follow, for it then begins where the robot is.
+        """
         config = RetargetConfig()
         speed = np.minimum(self._robot.limits_of(self.follower.joints)[2], config.max_speed)
-        steps = np.abs(np.diff([one for _, one in self.sent], axis=0))
-        return float(np.nanmax(steps / speed) * config.rate_hz)
+        times = np.array([at_s for at_s, _ in self.sent[1:]])
+        steps = np.abs(np.diff([one for _, one in self.sent], axis=0)) / speed
+        for (_, before), (at_s, after) in pairwise(self.said):
+            if before.startswith("ready") and after == "following":
+                steps[np.abs(times - at_s) < _NEAR_S] = 0.0
+        return float(steps.max() * config.rate_hz)
 
     def cells(
         self, seen_s: FloatArray, shown_s: FloatArray, tracked: FloatArray, true: FloatArray
@@ -180,8 +185,9 @@ class _Robot:
         # The last image is followed by a fault.
         changes = texts[first + 1 : np.searchsorted(times, seen_s[-1])]
         faults = sum(text.startswith("faulted") for text in changes)
-        step = f"{self.largest_step():.0%}"
-        return [*shares, f"{lag_s:.2f} s", step, f"{follows:.1%}", len(changes), faults]
+        rate_hz = (len(self.sent) - 1) / (self.sent[-1][0] - self.sent[0][0])
+        rate, step = f"{rate_hz:.0f} Hz", f"{self.largest_step():.0%}"
+        return [*shares, f"{lag_s:.2f} s", rate, step, f"{follows:.1%}", len(changes), faults]
 
 
 def true_directions(case: Case, results: Results, recorded: dict[int, int]) -> FloatArray:
