@@ -191,15 +191,20 @@ class SafeMotion:
         self.stop(now_ns)
         if not np.isfinite(target).all() or duration_ns <= 0:
             return
-        start, duration_s = self.set_point(now_ns), duration_ns / 1e9
+        start = self.set_point(now_ns)
+        self._segments.append(_Segment(now_ns / 1e9, start, np.zeros(len(start))))
+        self.go_on(target, duration_ns, share)
+
+    def go_on(self, target: FloatArray, duration_ns: int, share: float = 1.0) -> None:
+        """Move the set-point towards a finite ``target`` (n,) for a time from its stop on."""
+        begun_s, start, _ = self._segments[-1]
+        duration_s = duration_ns / 1e9
         lower, upper, speed = self._limits
         most = share * speed * duration_s
         goal = start + np.clip(np.clip(target, lower, upper) - start, -most, most)
-        now_s = now_ns / 1e9
-        self._segments += [
-            _Segment(now_s, start, (goal - start) / duration_s),
-            _Segment(now_s + duration_s, goal, np.zeros(len(goal))),
-        ]
+        if (goal != start).any():
+            self._segments[-1] = _Segment(begun_s, start, (goal - start) / duration_s)
+            self._segments.append(_Segment(begun_s + duration_s, goal, np.zeros(len(goal))))
 
 
 class Command(NamedTuple):
@@ -349,11 +354,16 @@ class Retargeter:
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
-        # On the way, too, the hand is not in the trunk.
-        most = share * self.limits.speed * duration_ns / 1e9
-        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
-        goal = np.where(held, point, self._method.clear(goal, point))
-        self._motion.move(goal, now_ns, duration_ns, share)
+        wanted, way = np.where(held, point, target + self._offset), [point]
+        # The next image may be late: what is not yet there goes on for the longest step.
+        parts_ns = duration_ns, longest_ns - duration_ns if duration_ns else 0
+        for part_ns in parts_ns:
+            # On the way, too, the hand is not in the trunk.
+            most = share * self.limits.speed * part_ns / 1e9
+            goal = way[-1] + np.clip(wanted - way[-1], -most, most)
+            way.append(np.where(held, point, self._method.clear(goal, way[-1])))
+        self._motion.move(way[1], now_ns, duration_ns, share)
+        self._motion.go_on(way[2], parts_ns[1], share)
         return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
 
     def _stop(self, reason: str, now_ns: int) -> Command:

@@ -137,7 +137,7 @@ def test_a_faster_robot_is_no_later() -> None:
 
 
 def test_the_start_is_soft_and_where_the_robot_is() -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=1.0, start="shoulder_roll=0.4"))
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(start="shoulder_roll=0.4", longest_step_s=0.1))
     assert robot.at(0).positions[0] == 0.4
     follow(robot, 2)
     # A tenth of the speed for the second image.
@@ -235,6 +235,19 @@ def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
     only = replace(MAP, angles=tuple("right_elbow_abduction" for _ in MAP.angles))
     single = Retargeter(ROBOT, only, RetargetConfig())
     assert not single.update(0, "tracking", BODY, posture, stddev).is_moving
+
+
+@pytest.mark.parametrize(("wanted_rad", "reached_rad"), [(0.15, 0.15), (1.0, 0.2)])
+def test_what_is_not_yet_there_goes_on_until_the_next_image_for_the_longest_step(
+    wanted_rad: float, reached_rad: float
+) -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=0.0))
+    posture = np.zeros(12)
+    posture[JOINT_NAMES.index("right_shoulder_flexion")] = wanted_rad
+    for tenth in range(2):
+        command = robot.update(tenth * 10**8, "tracking", BODY, posture, SURE)
+    assert command.duration_s == pytest.approx(0.1)
+    assert robot.at(10**9).positions[1] == pytest.approx(-reached_rad)
 
 
 def test_an_unsure_image_is_as_one_that_is_missing() -> None:
