@@ -18,6 +18,7 @@ import struct
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -184,6 +185,7 @@ class _Robot:
         follows = np.mean([texts[i] == "following" for i in at])
         # The last image is followed by a fault.
         changes = texts[first + 1 : np.searchsorted(times, seen_s[-1])]
+        print(self.name, dict(Counter(changes)))
         faults = sum(text.startswith("faulted") for text in changes)
         rate_hz = (len(self.sent) - 1) / (self.sent[-1][0] - self.sent[0][0])
         rate, step = f"{rate_hz:.0f} Hz", f"{self.largest_step():.0%}"
