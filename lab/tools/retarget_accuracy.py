@@ -43,7 +43,8 @@ _SPEEDS, _STEP_NS, _LONGEST_LAG = (1.0, 2.0, 4.0, 8.0), 10_000_000, 60
 _HEAD = ("robot", "side", "upper arm", "forearm", "shoulder to hand", "at a limit", "time")
 
 
-def _degrees(found: FloatArray, wanted: FloatArray) -> FloatArray:
+def degrees_between(found: FloatArray, wanted: FloatArray) -> FloatArray:
+    """Return the angles (...) between unit vectors (..., 3), degrees."""
     cosines: FloatArray = (found * wanted).sum(axis=-1)
     return np.degrees(np.arccos(np.clip(cosines, -1.0, 1.0)))
 
@@ -70,7 +71,7 @@ def lag_of(
         wanted = np.array([directions_of(body, posture, "right")[2] for posture in postures])
         at = np.rint((stamps_ns - stamps_ns[0]) / _STEP_NS).astype(int)
         shifted = np.array(way)[at[:, None] + np.arange(_LONGEST_LAG)]
-        behind.append(_degrees(shifted, wanted[:, None]))
+        behind.append(degrees_between(shifted, wanted[:, None]))
     found = np.concatenate(behind)
     half, most = np.percentile(found[:, 0], (50, 90))
     lag_s = np.median(found, axis=0).argmin() * _STEP_NS / 1e9
@@ -98,7 +99,7 @@ def row_of(
         now = follower.target(body, posture, now)
         arm = now[: len(lower)]
         found = follower.kinematics.directions(arm)
-        angles.append(_degrees(found, directions_of(body, posture, side)))
+        angles.append(degrees_between(found, directions_of(body, posture, side)))
         limited.append(bool(((arm < lower + 1e-6) | (arm > upper - 1e-6)).any()))
     took_ms = 1000 * (time.perf_counter() - begun) / len(postures)
     shares = (f"{half:.1f} / {most:.1f}°" for half, most in np.percentile(angles, (50, 90), 0).T)

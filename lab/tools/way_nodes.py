@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -31,16 +31,20 @@ _RECORDED = ("tracking_state", "joint_states", "joint_states_stddev", "keypoints
 
 
 class Recorder:
-    """Writes what trackers publish to a bag that :func:`.read_results` takes."""
+    """Writes what trackers publish to a bag that :func:`.read_results` takes.
+
+    Attributes:
+        node: subscribes.
+    """
 
     def __init__(self, bag: BagWriter, spaces: Sequence[str]) -> None:
         """Subscribe to the results in the namespaces ``spaces``."""
         self._bag, self._came_s = bag, time.monotonic()
         self._stamps_ns = dict.fromkeys(spaces, 0)
         rclpy.init(args=[], signal_handler_options=SignalHandlerOptions.NO)
-        self._node = rclpy.create_node("cardbox_ways", enable_rosout=False)
+        self.node = rclpy.create_node("cardbox_ways", enable_rosout=False)
         self._executor = SingleThreadedExecutor()
-        self._executor.add_node(self._node)
+        self._executor.add_node(self.node)
         for space in spaces:
             self._subscribe(space, "body_model", String, qos.LATCHED)
             for topic in _RECORDED:
@@ -58,7 +62,7 @@ class Recorder:
                 at_ns = self._stamps_ns[space] = stamp_ns_of(message)
             self._bag.write_raw(f"{space}/{topic}", name, raw, at_ns)
 
-        self._node.create_subscription(kind, f"{space}/{topic}", record, profile, raw=True)
+        self.node.create_subscription(kind, f"{space}/{topic}", record, profile, raw=True)
 
     def spin(self, duration_s: float) -> None:
         """Record for ``duration_s``."""
@@ -75,15 +79,21 @@ class Recorder:
     def close(self) -> None:
         """Leave ROS."""
         self._executor.shutdown()
-        self._node.destroy_node()  # type: ignore[no-untyped-call]
+        self.node.destroy_node()  # type: ignore[no-untyped-call]
         try_shutdown()
 
 
-def live(case: Case, folder: Path, rate: float) -> Iterator[Results]:
+def live(
+    case: Case,
+    folder: Path,
+    rate: float,
+    further: Callable[[Nodes, Any, str], Sequence[str]] | None = None,
+) -> Iterator[Results]:
     """Play the bag to the nodes at ``rate`` times its speed; yield the results by person.
 
-    Logs and results are written to ``folder``. Raises CardboxError if a node ends, or the bag does
-    not, or there are no results.
+    ``further`` starts more of the nodes, with the node that records and the namespace of the
+    results, and returns the topics to wait for. Logs and results are written to ``folder``. Raises
+    CardboxError if a node ends, or the bag does not, or there are no results.
     """
     # One camera has all nodes in its namespace, several have a tracker above theirs.
     space = f"/{case.cameras[0]}" if len(case.cameras) == 1 else ""
@@ -102,6 +112,7 @@ def live(case: Case, folder: Path, rate: float) -> Iterator[Results]:
         nodes.start("tracker", "--ros-args", "-r", f"__ns:={space or '/'}", *given)
         recorder = Recorder(bag, spaces)
         try:
+            awaited += further(nodes, recorder.node, space) if further else ()
             _play(case, nodes, awaited, rate, recorder)
         finally:
             recorder.close()

@@ -216,6 +216,10 @@ class Kinematics:
                     slopes.append(0.5 * np.array(normal) @ moved)
         return np.array(gaps), np.array(slopes).reshape(-1, count)
 
+    def hand(self, places: _Places) -> FloatArray:
+        """Return the hand (3,) from the shoulder, as :func:`hand_of`."""
+        return np.asarray((places.tip_m - places.origins_m[self.shoulder]) / self.reach_m)
+
     def hand_residual(
         self, positions: FloatArray, wanted: FloatArray, tilt: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
@@ -230,7 +234,7 @@ class Kinematics:
         x, y, _ = np.where(self._slides[:, None], 0.0, places.axes).T
         tilted = np.outer(places.turn[1], x) - np.outer(places.turn[0], y)
         gaps, slopes = self._too_near(places)
-        place = (places.tip_m - shoulder) / self.reach_m - wanted
+        place = self.hand(places) - wanted
         off = (_PLACE * place, _TILT * (places.turn[2] - tilt), _KEEPS_OUT * gaps)
         changes = (_PLACE / self.reach_m * moved, _TILT * tilted, _KEEPS_OUT * slopes)
         return np.concatenate(off), np.concatenate(changes)
@@ -308,6 +312,7 @@ class ArmFollower:
         gripper = (self.arm.gripper,) if self.arm.gripper else ()
         self.joints = (*self.arm.joints, *gripper)
         self._is_hand, self._scale = config.follow == "hand", config.hand_scale
+        self._has_clutch, self._offset = config.clutch, np.zeros(3)
         followed = ("hand",) if self._is_hand else ARM_JOINTS
         behind = tuple(f"{self._side}_{name}" for name in followed)
         hand = (f"{self._side}_hand_open",)
@@ -341,11 +346,21 @@ class ArmFollower:
         )
         width = np.minimum(self._high - self._low, 2 * np.pi)
         self._starts = np.vstack([rest, rest + width * (random.random((_STARTS, count)) - 0.5)])
+        # The first solution loads compiled code, which takes longer than a robot waits.
+        wanted = self.kinematics.directions(rest)
+        self._solved(rest, wanted[2] if self._is_hand else wanted)
 
-    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, body: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         """See :class:`~.retargeter.Method`."""
         if self._is_hand:
             wanted = self._scale * hand_of(body, posture, self._side) @ self.mount
+            if begins and self._has_clutch:
+                arm = now[: len(self.arm.joints)]
+                places, self._solution = self.kinematics.at(arm), arm
+                self._tilt, self._offset = places.turn[2], self.kinematics.hand(places) - wanted
+            wanted = wanted + self._offset
         else:
             wanted = directions_of(body, posture, self._side) @ self.mount
         before = now[: len(self.arm.joints)] if self._solution is None else self._solution

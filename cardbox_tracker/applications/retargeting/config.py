@@ -105,7 +105,8 @@ class RetargetConfig(Settings):
     )
     longest_step_s: float = setting(
         0.2,
-        "after a longer gap between two images the robot moves as if it had been this long",
+        "after a longer gap between two images the robot moves as if it had been this long; an "
+        "unsure joint goes on for this time to where it was last sure, and then holds",
         unit="s",
         limits=(0.01, 1.0),
     )

@@ -117,7 +117,9 @@ class JointMap:
         known = (*JOINT_NAMES, *HAND_OPEN_NAMES)
         return tuple(tuple(one for one in names if one in known) for names in behind)
 
-    def target(self, _: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, _: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         """See :class:`~.retargeter.Method`; a joint stays while its angle is unknown."""
         known = angles_of(posture)
         chosen = np.array([known[angle] if angle else 0.0 for angle in self.angles])

@@ -64,11 +64,14 @@ class Method(Protocol):
     def joints(self) -> tuple[str, ...]:
         """Names of the robot's joints that are moved."""
 
-    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, body: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         """Return target positions (n,) of the joints for a posture with head and hands, (16,).
 
         ``now`` (n,) are the current positions. What is not known of head and hands is nan. The
-        target may be beyond the joint limits; it is nan if there is no solution.
+        target may be beyond the joint limits; it is nan if there is no solution. With ``begins``,
+        movements are followed from this posture and these positions on, if with a clutch.
         """
 
     def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
@@ -188,15 +191,20 @@ class SafeMotion:
         self.stop(now_ns)
         if not np.isfinite(target).all() or duration_ns <= 0:
             return
-        start, duration_s = self.set_point(now_ns), duration_ns / 1e9
+        start = self.set_point(now_ns)
+        self._segments.append(_Segment(now_ns / 1e9, start, np.zeros(len(start))))
+        self.go_on(target, duration_ns, share)
+
+    def go_on(self, target: FloatArray, duration_ns: int, share: float = 1.0) -> None:
+        """Move the set-point towards a finite ``target`` (n,) for a time from its stop on."""
+        begun_s, start, _ = self._segments[-1]
+        duration_s = duration_ns / 1e9
         lower, upper, speed = self._limits
         most = share * speed * duration_s
         goal = start + np.clip(np.clip(target, lower, upper) - start, -most, most)
-        now_s = now_ns / 1e9
-        self._segments += [
-            _Segment(now_s, start, (goal - start) / duration_s),
-            _Segment(now_s + duration_s, goal, np.zeros(len(goal))),
-        ]
+        if (goal != start).any():
+            self._segments[-1] = _Segment(begun_s, start, (goal - start) / duration_s)
+            self._segments.append(_Segment(begun_s + duration_s, goal, np.zeros(len(goal))))
 
 
 class Command(NamedTuple):
@@ -260,6 +268,7 @@ class Retargeter:
         self._commanded_ns: int | None = None
         self._followed_ns: int | None = None
         self._offset = np.zeros(len(method.joints))
+        self._target, self._sure_ns = self._offset, np.full(len(method.joints), -np.inf)
 
     def begin(self, positions: FloatArray) -> None:
         """Stand still at the robot's ``positions`` (n,); the next image counts as the first."""
@@ -320,28 +329,41 @@ class Retargeter:
         if body is None:
             return self._stop("no body model", now_ns)
         held = self._held(posture, stddev, keypoints or {})
+        begins, longest_ns = self._followed_ns is None, round(self._config.longest_step_s * 1e9)
+        # An unsure image soon after a sure one is as one that is missing.
+        self._sure_ns = np.where(held, self._sure_ns, now_ns)
+        waits = held & (now_ns - self._sure_ns <= longest_ns) & (not begins)
+        held &= ~waits
         is_blind = self._follows.any() and held[self._follows].all()
         if is_blind or not np.isfinite(posture[:N_JOINTS]).all():
             return self._stop("too uncertain", now_ns)
         whole = with_head_and_hands(posture, stddev, self._config.max_stddev_rad, hands)
         point = self._motion.set_point(now_ns)
-        target = np.where(held, point, self._method.target(body, whole, point))
+        target = np.where(held, point, self._method.target(body, whole, point, begins))
+        target = self._target = np.where(waits, self._target, target)
         if not np.isfinite(target).all():
             return self._stop("no solution", now_ns)
         if self._followed_ns is None:
             self._followed_ns = now_ns
-            self._offset = point - target if self._config.clutch else np.zeros(len(target))
+            # A gripper opens or closes, and a hand that is followed alone began where it is.
+            is_moved = np.isinf(self.tolerance) | self._places.any(axis=1)
+            is_moved |= not self._config.clutch
+            self._offset = np.where(is_moved, 0.0, point - target)
         elapsed_ns = 0 if before_ns is None else stamp_ns - before_ns
         waited_ns = elapsed_ns if commanded_ns is None else now_ns - commanded_ns
-        longest_ns = round(self._config.longest_step_s * 1e9)
         duration_ns = max(min(elapsed_ns, waited_ns, longest_ns), 0)
         followed_s, soft_s = (now_ns - self._followed_ns) / 1e9, self._config.soft_start_s
         share = min(max(followed_s / soft_s, _SLOWEST), 1.0) if soft_s else 1.0
-        # On the way, too, the hand is not in the trunk.
-        most = share * self.limits.speed * duration_ns / 1e9
-        goal = point + np.clip(np.where(held, 0.0, target + self._offset - point), -most, most)
-        goal = np.where(held, point, self._method.clear(goal, point))
-        self._motion.move(goal, now_ns, duration_ns, share)
+        wanted, way = np.where(held, point, target + self._offset), [point]
+        # The next image may be late: what is not yet there goes on for the longest step.
+        parts_ns = duration_ns, longest_ns - duration_ns if duration_ns else 0
+        for part_ns in parts_ns:
+            # On the way, too, the hand is not in the trunk.
+            most = share * self.limits.speed * part_ns / 1e9
+            goal = way[-1] + np.clip(wanted - way[-1], -most, most)
+            way.append(np.where(held, point, self._method.clear(goal, way[-1])))
+        self._motion.move(way[1], now_ns, duration_ns, share)
+        self._motion.go_on(way[2], parts_ns[1], share)
         return Command(self.at(now_ns + duration_ns).positions, FOLLOWING, duration_ns / 1e9)
 
     def _stop(self, reason: str, now_ns: int) -> Command:
@@ -361,10 +383,13 @@ class Retargeter:
         sure = np.isfinite(given).all(axis=0) & self._tracked(_ENDS, keypoints)
         angles, spread = np.where(sure, given, 0.0)
         bent, shaking = angles[_FLEXIONS], spread[_FLEXIONS]
-        # The root of the mean square of the cosine, in which the abduction turns the limb.
+        # The root of the mean square of the cosine, in which the abduction turns the limb, and that
+        # of the chord of the turn: an angle that is not known at all leaves the limb on a cone.
         turned = np.minimum(np.hypot(np.cos(bent), shaking * np.sin(bent)), 1.0)
+        turned *= np.sqrt(-2.0 * np.expm1(-0.5 * np.clip(spread[_ABDUCTIONS], -9, 9) ** 2))
         spreads = np.tile(spread, (len(self._sources), 1))
-        spreads[:, _ABDUCTIONS] *= np.where(self._sources[:, _FLEXIONS], turned, 1.0)
+        both = self._sources[:, _FLEXIONS]
+        spreads[:, _ABDUCTIONS] = np.where(both, turned, spread[_ABDUCTIONS])
         is_held = self._sources & ~(sure & (spreads <= self._config.max_stddev_rad))
         is_lost = self._places & ~self._tracked(KEYPOINT_NAMES, keypoints)
         return np.asarray(is_held.any(axis=1) | is_lost.any(axis=1))
@@ -392,9 +417,11 @@ class _Together:
             )
         self._ends = np.cumsum([len(one.joints) for one in parts])[:-1]
 
-    def target(self, body: BodyModel, posture: FloatArray, now: FloatArray) -> FloatArray:
+    def target(
+        self, body: BodyModel, posture: FloatArray, now: FloatArray, begins: bool = False
+    ) -> FloatArray:
         parts = zip(self._parts, np.split(now, self._ends), strict=True)
-        return np.concatenate([one.target(body, posture, part) for one, part in parts])
+        return np.concatenate([one.target(body, posture, part, begins) for one, part in parts])
 
     def clear(self, positions: FloatArray, now: FloatArray) -> FloatArray:
         split = (np.split(one, self._ends) for one in (positions, now))

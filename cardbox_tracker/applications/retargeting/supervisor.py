@@ -149,7 +149,10 @@ class Supervisor:
 
     def moment(self, now_ns: int) -> Moment | None:
         """Return positions and velocities to send now, or None if none may be sent."""
-        self._motion_ns, self._sent_ns = self._clock_ns(now_ns), now_ns
+        before_ns, self._motion_ns = self._motion_ns, self._clock_ns(now_ns)
+        # A tick that was late is made up for by the next one, which comes as much earlier.
+        late_ns = now_ns - self._sent_ns - (self._motion_ns - before_ns)
+        self._sent_ns = now_ns - min(max(late_ns, 0), self._period_ns)
         is_sent = self.phase in _MOVING or self._motion_ns <= self._stopped_ns
         self._sent = self._retargeter.at(self._motion_ns) if is_sent else None
         return self._sent

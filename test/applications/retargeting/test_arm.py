@@ -121,6 +121,29 @@ def test_the_hand_alone_is_followed_upright_whatever_the_elbow_does(scale: float
     assert places.turn[2] @ tilt > np.cos(np.radians(8.0))
 
 
+def test_with_a_clutch_the_hand_moves_as_the_persons_from_where_it_is() -> None:
+    config = RetargetConfig(follow="hand", clutch=True, max_speed=20.0, trunk_radius_m=0.0)
+    follower = ArmFollower(ROBOT, config)
+    robot = Retargeter(ROBOT, follower, config)
+    start = np.array([-0.6, -0.5, 0.4, -1.2, 0.3, 0.2, 0.0])
+    robot.begin(start)
+    before = posture(right_shoulder_abduction=40, right_elbow_flexion=60)
+    after = posture(right_shoulder_abduction=60, right_shoulder_flexion=15, right_elbow_flexion=70)
+    hands, tilts = [], []
+    for number in range(40):
+        now = before if number < 20 else after
+        robot.update(number * 10**8, "tracking", BODY, now[:14], np.full(14, 0.1))
+        places = follower.kinematics.at(robot.at((number + 1) * 10**8).positions)
+        hands.append(follower.kinematics.hand(places))
+        tilts.append(places.turn[2])
+    there = follower.kinematics.hand(follower.kinematics.at(start))
+    np.testing.assert_allclose(hands[:20], np.tile(there, (20, 1)), atol=0.02)
+    way = hand_of(BODY, after, "right") - hand_of(BODY, before, "right")
+    assert np.linalg.norm(way) > 0.2
+    np.testing.assert_allclose(hands[-1] - there, way, atol=0.02)
+    assert tilts[-1] @ follower.kinematics.at(start).turn[2] > np.cos(np.radians(8.0))
+
+
 def test_a_rest_of_another_joint_is_refused() -> None:
     with pytest.raises(CardboxError, match=r"rest 'jaw=1' is not JOINT=VALUE.*wrist_pitch"):
         ArmFollower(ROBOT, RetargetConfig(rest="jaw=1"))

@@ -137,7 +137,7 @@ def test_a_faster_robot_is_no_later() -> None:
 
 
 def test_the_start_is_soft_and_where_the_robot_is() -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=1.0, start="shoulder_roll=0.4"))
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(start="shoulder_roll=0.4", longest_step_s=0.1))
     assert robot.at(0).positions[0] == 0.4
     follow(robot, 2)
     # A tenth of the speed for the second image.
@@ -208,7 +208,7 @@ def test_of_a_hand_that_is_followed_alone_its_keypoint_decides(
     ],
 )
 def test_the_dead_man(state: str, deviation: float, status: str) -> None:
-    robot = Retargeter(ROBOT, MAP, RetargetConfig())
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(longest_step_s=0.05))
     posture = reference_posture("arms")
     follow(robot, 5)
     assert robot.update(5 * 10**8, state, BODY, posture, np.full(12, deviation)).status == status
@@ -218,21 +218,54 @@ def test_the_dead_man(state: str, deviation: float, status: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("flexion_deg", "moves"), [(88.0, True), (30.0, False)], ids=["along the axis", "across"]
+    ("flexion_deg", "spread_rad", "moves"),
+    [(88.0, 1.8, True), (72.0, 4.0, True), (30.0, 1.8, False)],
+    ids=["along the axis", "on a narrow cone", "across"],
 )
 def test_a_limb_along_the_axis_of_its_abduction_has_a_sure_direction(
-    flexion_deg: float, moves: bool
+    flexion_deg: float, spread_rad: float, moves: bool
 ) -> None:
     """A forearm straight ahead is known, and its abduction is not."""
     posture, stddev = np.zeros(12), SURE.copy()
     posture[JOINT_NAMES.index("right_elbow_flexion")] = np.radians(flexion_deg)
-    stddev[JOINT_NAMES.index("right_elbow_abduction")] = 1.8
+    stddev[JOINT_NAMES.index("right_elbow_abduction")] = spread_rad
     _, robot, _ = make_retargeter(CONFIG / "example_arm.urdf", None, RetargetConfig())
     assert robot.update(0, "tracking", BODY, posture, stddev).is_moving == moves
     # What follows the abduction alone needs it.
     only = replace(MAP, angles=tuple("right_elbow_abduction" for _ in MAP.angles))
     single = Retargeter(ROBOT, only, RetargetConfig())
     assert not single.update(0, "tracking", BODY, posture, stddev).is_moving
+
+
+@pytest.mark.parametrize(("wanted_rad", "reached_rad"), [(0.15, 0.15), (1.0, 0.2)])
+def test_what_is_not_yet_there_goes_on_until_the_next_image_for_the_longest_step(
+    wanted_rad: float, reached_rad: float
+) -> None:
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=0.0))
+    posture = np.zeros(12)
+    posture[JOINT_NAMES.index("right_shoulder_flexion")] = wanted_rad
+    for tenth in range(2):
+        command = robot.update(tenth * 10**8, "tracking", BODY, posture, SURE)
+    assert command.duration_s == pytest.approx(0.1)
+    assert robot.at(10**9).positions[1] == pytest.approx(-reached_rad)
+
+
+def test_an_unsure_image_is_as_one_that_is_missing() -> None:
+    """The arm goes on to where it was last sure, for the longest step; then it holds."""
+    robot = Retargeter(ROBOT, MAP, RetargetConfig(soft_start_s=0.0))
+    there, elsewhere = np.zeros(12), np.zeros(12)
+    number = JOINT_NAMES.index("right_shoulder_flexion")
+    there[number], elsewhere[number] = 0.5, -0.5
+    unsure = np.full(12, 2.0)
+    said = []
+    for tenth in range(9):
+        sure = tenth in (0, 1, 4)
+        now = there if sure else elsewhere
+        command = robot.update(tenth * 10**8, "tracking", BODY, now, SURE if sure else unsure)
+        said.append(command.status)
+    assert said == ["following"] * 7 + ["holding: too uncertain"] * 2
+    moved = [robot.at(tenth * 10**8).positions[1] for tenth in (1, 5, 9, 20)]
+    assert moved == sorted(moved, reverse=True) and moved[-1] == pytest.approx(-0.5)
 
 
 def test_after_holding_nothing_is_made_up_for() -> None:

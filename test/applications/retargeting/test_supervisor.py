@@ -301,6 +301,20 @@ def test_after_a_stall_of_the_node_no_command_is_farther_than_a_step(stall_s: fl
     assert steps(bench).max() <= STEP_RAD
 
 
+def test_ticks_that_are_late_in_turn_make_no_robot_slower() -> None:
+    ways = []
+    for late_ns in (0, 8_000_000):
+        bench = following()
+        for number in range(20):
+            bench.now_ns += late_ns if number % 2 == 0 else -late_ns
+            bench.step()
+            bench.posture()
+        assert steps(bench).max() <= STEP_RAD
+        ways.append(bench.robot)
+    assert np.abs(np.subtract(*ways)).max() <= STEP_RAD
+    assert np.abs(ways[0] - 0.04).max() > 10 * STEP_RAD
+
+
 def test_a_clock_that_is_set_back_moves_nothing_by_itself() -> None:
     bench = following()
     bench.stamp_ns -= 3600 * 10**9

@@ -49,8 +49,16 @@ def test_a_frame_of_sonic_has_the_bytes_computed_by_hand() -> None:
     assert len(expected) == 2080
 
 
+# Its tables of the fields that protocol v3 requires: shapes behind the number of frames.
+SONIC_FIELDS = {"smpl_joints": (24, 3), "smpl_pose": (21, 3), "joint_pos": (29,)} | {
+    "joint_vel": (29,),
+    "body_quat": (4,),
+    "frame_index": (),
+}
+
+
 def decoded(frame: bytes) -> dict[str, Any]:
-    """Decode a frame as the page of SONIC's protocol describes it."""
+    """Decode a frame as the page of SONIC's protocol describes it, and check what it requires."""
     assert frame[:4] == b"pose"
     header = json.loads(frame[4:1284].rstrip(b"\0"))
     assert (header["v"], header["endian"]) == (3, "le")
@@ -62,6 +70,12 @@ def decoded(frame: bytes) -> dict[str, Any]:
         found[entry["name"]] = np.reshape(numbers, entry["shape"])
         offset += size * count
     assert offset == len(frame)
+    assert {name: one.shape for name, one in found.items()} == {
+        name: (header["count"], *shape) for name, shape in SONIC_FIELDS.items()
+    }
+    # Of the robot's joints, only the wrists count.
+    assert not found["joint_pos"][:, :23].any() and not found["joint_vel"].any()
+    assert np.linalg.norm(found["body_quat"], axis=1) == pytest.approx(1.0)
     return found
 
 
@@ -72,9 +86,10 @@ def test_a_decoder_of_the_page_reads_a_frame_of_sonic() -> None:
     assert turned["frame_index"].tolist() == [5]
     # The joints are in the person's frame, whatever the yaw.
     assert turned["smpl_joints"][0] == pytest.approx(body().points_m)
-    assert set(turned) == {
-        *("smpl_joints", "smpl_pose", "joint_pos", "joint_vel", "body_quat", "frame_index")
-    }
+    # Three joints of each wrist, left before right.
+    wrists = body().wrists_rad
+    assert turned["joint_pos"][0, 23::2] == pytest.approx(wrists[0])
+    assert turned["joint_pos"][0, 24::2] == pytest.approx(wrists[1])
 
 
 # The table of its document on full-body tracking: upper case, in this order.

@@ -19,7 +19,7 @@ from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from lab.evaluation.angles import true_postures
-from lab.tools import retarget_accuracy, rula_accuracy
+from lab.tools import retarget_accuracy, retarget_live, rula_accuracy
 
 BODY = body_from_proportions(1.75, 2.0, 0.4, 0.0)
 COUNT = 20
@@ -109,7 +109,7 @@ def test_a_faster_robot_lags_less() -> None:
     assert 0.1 <= lags[1] <= 0.25 and lags[1] <= lags[0]
 
 
-@pytest.mark.parametrize("tool", [rula_accuracy, retarget_accuracy])
+@pytest.mark.parametrize("tool", [rula_accuracy, retarget_accuracy, retarget_live])
 def test_the_documents_have_the_tables_of_today(tool: Any) -> None:
     text = tool.DOCUMENT.read_text(encoding="utf-8")
     rows = text.split(tool.BEGIN)[1].split(tool.END)[0].strip().splitlines()
