@@ -21,6 +21,7 @@ from cardbox_tracker.detectors.own_network import OwnModel
 from cardbox_tracker.detectors.person_choice import PersonChoice
 from cardbox_tracker.measuring.scene import FOUND
 from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.recordings import measured_scene
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.measured_scene import Watched, turns_in, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
@@ -182,8 +183,9 @@ def test_the_place_is_of_the_first_image_also_if_turned_images_are_read_again(
 
 
 def test_the_turns_show_a_field_of_view_that_is_not_given(
-    shaken: Path, capsys: pytest.CaptureFixture[str]
+    shaken: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(measured_scene, "_MOST_TURNED", 8)
     person = PersonRequest(BodyModel(), None, 0.0, is_pitch_given=True)
     asked = replace(request(shaken), camera=GivenCamera(fps=10.0))
     with asked.open() as source:
