@@ -194,9 +194,9 @@ class Calibration:
     def of_fov(cls, width: int, height: int, fov_deg: float) -> Calibration:
         """Return an ideal lens with a field of view, 0 to 180 degrees, across the image's width."""
         fov_deg = real_number("field of view", fov_deg)
-        if not 0.0 < fov_deg < 180.0:
+        if not 1e-3 <= fov_deg < 180.0:
             raise CameraError(
-                f"the field of view is {fov_deg:g} degrees; expected more than 0 and less than 180"
+                f"the field of view is {fov_deg:g} degrees; expected 0.001 or more, less than 180"
             )
         focal_px = width / 2 / np.tan(np.radians(fov_deg) / 2)
         k = np.diag([focal_px, focal_px, 1.0])

@@ -86,7 +86,7 @@ _NO_NUMBER = re.compile(
 )
 _OF_PYTHON = re.compile(
     r"object (is|has|cannot) |NoneType|codec|unpack|indices must|convert float|inhomogeneous"
-    r"|array element|broadcast|reshape|dtype"
+    r"|array element|broadcast|reshape|dtype|not supported between"
 )
 _KINDS_OF_PYTHON = TypeError, AttributeError, IndexError, ArithmeticError, RecursionError
 

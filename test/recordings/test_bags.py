@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import os
+import re
 import resource
 import shutil
 from pathlib import Path
@@ -213,6 +214,13 @@ def test_damaged_metadata_is_refused(tmp_path: Path, text: str) -> None:
     folder = record(tmp_path / "bag")
     (folder / "metadata.yaml").write_text(text)
     assert str(folder) in refusal(folder)
+
+
+def test_metadata_of_another_type_are_refused_without_the_words_of_python(tmp_path: Path) -> None:
+    folder = record(tmp_path / "bag")
+    whole = (folder / "metadata.yaml").read_text()
+    (folder / "metadata.yaml").write_text(re.sub(r"version: \d+", "version: ;", whole))
+    assert "of another type, size or range" in refusal(folder)
 
 
 def test_a_recording_without_messages_is_refused(tmp_path: Path, storage: str) -> None:

@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from PIL import Image
 
@@ -288,6 +288,7 @@ NUMBER = st.one_of(
     ),
     NUMBER,
 )
+@example("field of view", 5e-324)
 def test_any_number_in_python(of: str, value: Any) -> None:
     kind, _, name = of.partition(" ")
     make: dict[str, Callable[[], Any]] = {
