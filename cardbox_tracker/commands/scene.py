@@ -61,7 +61,12 @@ def measured_scene(
         roll_rad = person.body.camera_pose.roll_rad
         recording = replace(recording, camera=recording.camera.standing(roll_rad))
     with ExitStack() as stack:
-        source = stack.enter_context(recording.open())
+
+        def opened(asked: RecordingRequest) -> Recording:
+            stack.close()
+            return stack.enter_context(asked.open())
+
+        source = opened(recording)
         span = person.start_s, person.end_s
         bodies, first = [person.body, *person.others], source.first
         tilt = person.body.camera_pose
@@ -86,18 +91,16 @@ def measured_scene(
             if moves and lens_of(first.camera).origin == USUAL:
                 lens = lens_in(source, *span)
             if lens is not None:
-                stack.close()
                 seeing = recording.camera.seeing(lens.mean, lens.stddev)
                 recording = replace(recording, camera=seeing)
-                source = stack.enter_context(recording.open())
+                source = opened(recording)
                 first = source.first
                 print_remarks([_found_lens(lens)])
             turns = turns_in(source, watched, *span) if moves else None
             background = Background(moves)
             if turns is not None:
-                stack.close()
                 recording = recording.turned_back(turns[0])
-                source = stack.enter_context(recording.open())
+                source = opened(recording)
                 choice = choice and turns[0].placed(choice)
                 watched, first = watch(source, *span, choice), source.first
                 background = Background(edges=turns[1])
@@ -107,8 +110,7 @@ def measured_scene(
             found = found._replace(camera=found.camera._replace(fov_rad=lens))
         better = _corrected(recording, found.camera)
         if better is not recording:
-            stack.close()
-            source = stack.enter_context(better.open())
+            source = opened(better)
             watched, first = watch(source, *span, choice), source.first
         chosen = _checked(watched.chosen)
         stands = {"camera_roll_rad": better.camera.stands_rad}

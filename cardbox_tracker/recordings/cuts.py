@@ -32,15 +32,19 @@ _ALIKE = 0.6
 _TURNS, _MOST_TURNS, _SAME, _STILL = 20, 0.8, 0.9, 0.1
 
 
-def with_cuts(items: Iterable[T], image_of: Callable[[T], Image]) -> Iterator[tuple[T, bool]]:
+def with_cuts(
+    items: Iterable[T], image_of: Callable[[T], Image], turns: Turns | None = None
+) -> Iterator[tuple[T, bool]]:
     """Yield items of a film with whether it is cut before their images; one is read in advance.
 
-    The images are (H, W) grey or (H, W, 3) bgr.
+    The images are (H, W) grey or (H, W, 3) bgr; ``turns`` sees them, too.
     """
     held: tuple[T, Image] | None = None
     before: Image | None = None
     for item in items:
         after = _reduced(image_of(item))
+        if turns is not None:
+            turns.see(after)
         if held is not None:
             one, now = held
             is_other = before is not None and _is_other(before, now)
@@ -56,22 +60,27 @@ class Turns:
     """Two cameras on one topic that take turns: every second image shows the same, and no other.
 
     Light that changes from image to image leaves the grey values alike.
+
+    Attributes:
+        are_seen: whether the last images show this.
     """
 
     def __init__(self) -> None:
         """Begin before the first image."""
+        self.are_seen = False
         self._last = deque[Image](maxlen=2)
         self._alternate = deque[bool](maxlen=_TURNS)
 
     def see(self, image: Image) -> bool:
         """Take the next image, (H, W) grey or (H, W, 3) bgr; return whether cameras take turns."""
-        now = _reduced(image)
+        now = image if image.shape == _SIZE[::-1] else _reduced(image)
         if len(self._last) == self._last.maxlen:
             again, before = self._last
             is_other = _changed(now, before) > _MOST and _correlation(now, before) < _SAME
             self._alternate.append(is_other and _changed(now, again) < _STILL)
         self._last.append(now)
-        return sum(self._alternate) > _MOST_TURNS * _TURNS
+        self.are_seen = sum(self._alternate) > _MOST_TURNS * _TURNS
+        return self.are_seen
 
 
 def _reduced(image: Image) -> Image:

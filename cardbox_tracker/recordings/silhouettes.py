@@ -418,9 +418,10 @@ class SilhouetteSource:
             yield from kept
             return
         keeps = self._file is not None and self._kept == 0
-        shown, turns = with_cuts(self._read(kept), lambda one: one.image), Turns()
+        turns = Turns()
+        shown = with_cuts(self._read(kept), lambda one: one.image, turns)
         for used, (found, is_cut) in enumerate(shown, 1):
-            if turns.see(found.image):
+            if turns.are_seen:
                 raise BagError(
                     f"cameras take turns on {self.topic}: every second image shows another place; "
                     "give each camera a topic of its own"

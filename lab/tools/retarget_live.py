@@ -12,8 +12,6 @@ run, and are worse where other programs take the processor.
 from __future__ import annotations
 
 import argparse
-import os
-import signal
 import struct
 import sys
 import tempfile
@@ -48,11 +46,11 @@ from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate
+from cardbox_tracker.ros.runtime.processes import Nodes
 from lab.pages import replaced, row, table
 from lab.tools.retarget_accuracy import DOCUMENT, degrees_between
 from lab.tools.way_cases import Case, cases_of
-from lab.tools.way_nodes import live
+from lab.tools.way_nodes import live, prepare
 
 BEGIN, END = "<!-- retarget-live:begin -->", "<!-- retarget-live:end -->"
 _HEAD = (
@@ -263,11 +261,7 @@ def main() -> int:
     parser.add_argument("--robot", action="append", type=Path, metavar="URDF", required=True)
     parser.add_argument("--write", action="store_true", help="write the table into the document")
     given = parser.parse_args()
-    # Nodes are stopped on the way out.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    os.environ.setdefault("PYTHONPATH", str(Path(__file__).parents[2]))
-    isolate()
-    compile_kernels()
+    prepare()
     rows = [table(_HEAD, ())]
     for session in given.sessions:
         case = next(cases_of(session))

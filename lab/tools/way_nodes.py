@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import sys
 import time
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -22,12 +25,20 @@ from cardbox_tracker.recordings.result_bag import result_writer
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.ros.messages.types import class_of
 from cardbox_tracker.ros.runtime import qos
-from cardbox_tracker.ros.runtime.processes import Nodes, running_nodes
+from cardbox_tracker.ros.runtime.processes import Nodes, compile_kernels, isolate, running_nodes
 from lab.tools.way_cases import Case
 
 _START_S, _QUIET_S, _SHOWN = 180.0, 3.0, 400
 # In the order of their publication.
 _RECORDED = ("tracking_state", "joint_states", "joint_states_stddev", "keypoints")
+
+
+def prepare() -> None:
+    """Keep nodes of this tree from other graphs, compile for them, and stop them on the way out."""
+    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
+    os.environ.setdefault("PYTHONPATH", str(Path(__file__).parents[2]))
+    isolate()
+    compile_kernels()
 
 
 class Recorder:

@@ -12,8 +12,6 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
-import signal
 import subprocess
 import sys
 import tempfile
@@ -34,10 +32,9 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.result_reader import Results, read_results
 from cardbox_tracker.recordings.result_table import POINT_COLUMNS
 from cardbox_tracker.recordings.truth import beside_shoulders
-from cardbox_tracker.ros.runtime.processes import compile_kernels, isolate
 from cardbox_tracker.tracking.estimate import TRACKING
 from lab.tools.way_cases import Case, Person, cases_of
-from lab.tools.way_nodes import live
+from lab.tools.way_nodes import live, prepare
 
 WAYS = {"film": "film", "bag": "bag", "slow": "live, slowly", "live": "live"}
 """Headings of the columns of the page by the name of the way."""
@@ -204,11 +201,7 @@ def main() -> None:
     parser.add_argument("--rate", type=float, default=0.3, help="speed of slow replay")
     parser.add_argument("--full-speed", action="store_true", help="also live at full speed")
     options = parser.parse_args()
-    # Nodes are stopped on the way out.
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(128 + signal.SIGTERM))
-    os.environ.setdefault("PYTHONPATH", str(Path(__file__).parents[2]))
-    isolate()
-    compile_kernels()
+    prepare()
     kept = options.output.with_suffix(".json")
     found: dict[str, dict[str, Any]] = json.loads(kept.read_text()) if kept.is_file() else {}
     for case in (one for folder in options.sessions for one in cases_of(folder)):

@@ -42,6 +42,10 @@ from cardbox_tracker.tracking.session import Session
 
 CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
+# A second camera that looks at the point 2.6 m in front of the first one.
+_TURN = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
+_MIDDLE_M = np.array([0.0, 0.0, 2.6])
+ASIDE = OtherCamera(CAMERA, Extrinsics(_TURN, _MIDDLE_M - _TURN @ _MIDDLE_M))
 RED, BLUE, GREY = (40, 40, 220), (220, 60, 40), (90, 90, 90)
 STEP_NS = 66_666_667
 Detect = Callable[..., ImagePoints]
@@ -287,12 +291,8 @@ def test_statures_in_the_wrong_order_are_told(scales: tuple[float, float], is_to
 
 
 def test_a_camera_that_misses_a_person_takes_their_place_from_the_other(detected: Detect) -> None:
-    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
-    # The second camera looks at the point 2.6 m in front of the first one.
-    middle_m = np.array([0.0, 0.0, 2.6])
-    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
-    view = View.of(BODY, CAMERA, other)
-    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    view = View.of(BODY, CAMERA, ASIDE)
+    people = Session([BODY], CAMERA, default_preset(), others=[ASIDE], people=2)
     for image in range(12):
         seen = []
         for body, states_of in ((BODY, np.copy), (view.body, view.states)):
@@ -319,11 +319,8 @@ def test_a_second_camera_that_contradicts_the_joints_of_all_people_is_told(
     detected: Detect, lower_px: int
 ) -> None:
     """The images are 18 px lower than the pose says, as after a pitch of 4 degrees."""
-    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
-    middle_m = np.array([0.0, 0.0, 2.6])
-    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
-    view = View.of(BODY, CAMERA, other)
-    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    view = View.of(BODY, CAMERA, ASIDE)
+    people = Session([BODY], CAMERA, default_preset(), others=[ASIDE], people=2)
     for image in range(8):
         seen = []
         for body, states_of, down in ((BODY, np.copy, 0), (view.body, view.states, lower_px)):
@@ -350,10 +347,7 @@ def test_a_second_camera_that_contradicts_the_joints_of_all_people_is_told(
 
 def test_the_gap_between_two_lines_of_sight_by_hand() -> None:
     """Both cameras look at the point 2.6 m before them, where a trunk of 0.5 m has 50 px."""
-    turn = np.array([(0.5, 0.0, 0.75**0.5), (0.0, 1.0, 0.0), (-(0.75**0.5), 0.0, 0.5)])
-    middle_m = np.array([0.0, 0.0, 2.6])
-    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
-    people = Session([BODY], CAMERA, default_preset(), others=[other], people=2)
+    people = Session([BODY], CAMERA, default_preset(), others=[ASIDE], people=2)
     people._last_ns = 1
 
     def gap(trunk_px: float, other_px: float, lower_px: float = 0.0) -> float:
