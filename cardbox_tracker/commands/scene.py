@@ -107,7 +107,9 @@ def measured_scene(
                 print_remarks([turns[0].remark])
         found = found_camera(recording, person, watched, first.camera, background)
         if lens is not None:
-            found = found._replace(camera=found.camera._replace(fov_rad=lens))
+            # Turned images are wider than those in which it was found.
+            shown = found.camera.fov_rad._replace(origin=lens.origin, by=lens.by)
+            found = found._replace(camera=found.camera._replace(fov_rad=shown))
         better = _corrected(recording, found.camera)
         if better is not recording:
             source = opened(better)

@@ -54,7 +54,7 @@ _SHOWN, _SOUGHT = 1, 2
 _MOST_UNKNOWN = 0.2
 # Focal lengths that are tried, in those of the camera; tolerance of their logarithm. Each is rated
 # by the mean distance of the edges, in _AGREES and at most this number of it.
-_LENSES, _TOLERANCE, _FAR = 0.6 * 1.35 ** np.arange(6), 0.02, 3.0
+_LENSES, _TOLERANCE, _FAR = 0.6 * 1.35 ** np.arange(7), 0.02, 3.0
 # Relative deviation of a focal length: a camera that is held in hands turns about an elbow, half a
 # metre behind it, so what is 4 m away seems to turn by an eighth more.
 _HELD = 0.06
