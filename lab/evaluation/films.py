@@ -33,8 +33,9 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.doubt import FAR_M
-from cardbox_tracker.tracking.estimate import TRACKING, Estimate
+from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.precompile import compile_all
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.people import people_figures
@@ -52,6 +53,10 @@ _FIGURES = (
     *("frames", "without_estimate", "aligned", "absolute"),
     *("tracking", "tracking_beyond_30"),
 )
+
+
+FAR_DEG = 10.0
+"""Error of the camera's pitch from which on the vertical counts as wrong."""
 
 
 class Film(NamedTuple):
@@ -95,7 +100,8 @@ def make_film(
         shape: a name of ``SHAPES``.
         path: video to write, .mp4.
         motion: a name of ``MOTIONS``. Upright mirrors show what is beside the session's images.
-        is_compared: leave out the truth of images that have a joint outside with any of these.
+        is_compared: show the mirrors in a still film, too, and leave out the truth of images that
+            have a joint outside with any motion.
 
     Raises:
         CardboxError: the folder is not a session, or the video cannot be written.
@@ -129,13 +135,13 @@ def make_film(
         if is_compared:
             every = [[_turned(turn, down, of(one)) for of in MOTIONS.values()] for one in shares]
             session = _inside(session, dict(zip(stamps_ns, np.array(every), strict=True)), k, size)
-        is_still = motion == "still"
+        is_plain = motion == "still" and not is_compared
         maps = cv2.initUndistortRectifyMap(lens.k, lens.distortion, turn, k, size, cv2.CV_32FC1)
-        border = cv2.BORDER_CONSTANT if is_still else cv2.BORDER_REFLECT_101
+        border = cv2.BORDER_CONSTANT if is_plain else cv2.BORDER_REFLECT_101
         fps = round(1e9 / float(np.median(np.diff(stamps_ns))), 2)
         with video_file(path, fps) as add:
             for image, there in zip(images, turns, strict=True):
-                if not is_still:
+                if not is_plain:
                     maps = _mirrored(lens, there, down, k, size)
                 shown = image.as_sent
                 color = shown if shown.ndim == 3 else cv2.cvtColor(shown, cv2.COLOR_GRAY2BGR)
@@ -242,23 +248,29 @@ def film_figures(
     run = run_of(film.session, body, "", by_stamp, [float("nan")])
     every = people_figures(film.session, run)
     found = {name: every[name] for name in _FIGURES if name in every}
-    found["placed"], found["placed_beyond_30"] = _placed(film.session, by_stamp)
-    if body is not None:
-        found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
-    return found | {"pitch_deg": film.session.truth.pitch_deg}
+    pitch_deg = film.session.truth.pitch_deg
+    pitch_found_deg = np.nan if body is None else float(np.degrees(body.camera_pose.pitch_rad))
+    is_level = abs(pitch_found_deg - pitch_deg) <= FAR_DEG
+    found |= _other_verdicts(film.session, by_stamp, is_level)
+    return found | {"pitch_found_deg": pitch_found_deg, "pitch_deg": pitch_deg}
 
 
-def _placed(session: RecordedSession, by_stamp: Mapping[int, Estimate]) -> tuple[int, int]:
-    """Count images whose shape and place are both sure, and those of them with a joint far off."""
-    count = beyond = 0
+def _other_verdicts(
+    session: RecordedSession, by_stamp: Mapping[int, Estimate], is_level: bool
+) -> dict[str, int]:
+    """Count images whose vertical and whose place are sure, and those of them that are wrong."""
+    counts = dict.fromkeys(("vertical", "vertical_wrong", "place", "place_wrong"), 0)
     for stamp_ns, true_m in zip(session.stamps_ns.tolist(), session.keypoints_m, strict=True):
         one = by_stamp.get(stamp_ns)
-        if one is None or one.state != TRACKING or one.place is None or one.keypoints_m is None:
+        if one is None or one.keypoints_m is None:
             continue
-        if one.place.state is KeypointState.TRACKED:
-            count += 1
-            beyond += bool(np.linalg.norm(one.keypoints_m - true_m, axis=1).max() > FAR_M)
-    return count, beyond
+        counts["vertical"] += one.vertical_state is KeypointState.TRACKED
+        counts["vertical_wrong"] += one.vertical_state is KeypointState.TRACKED and not is_level
+        if one.place is not None and one.place.state is KeypointState.TRACKED:
+            off_m = (one.keypoints_m - true_m)[list(SHOULDERS)].mean(axis=0)
+            counts["place"] += 1
+            counts["place_wrong"] += bool(np.linalg.norm(off_m) > FAR_M)
+    return counts
 
 
 def films_report(results: Mapping[str, Any]) -> str:
@@ -277,20 +289,27 @@ def films_report(results: Mapping[str, Any]) -> str:
         "Each session is tracked by `cardbox track FILM --detector mediapipe` with what is given, "
         "and without an empty scene. Errors are those of shoulders, elbows and hands, cm; "
         "*aligned*: beside the middle of the shoulders. Settings were chosen on the same "
-        "recordings. An image that is `tracking` is beyond 30 cm if a joint is, beside the middle "
-        "of the shoulders. With motions of the camera, images count whose joints are in view with "
-        "each of them. *Placed*: the state is `tracking`, and that of the place is `tracked`; "
-        "then the place counts, too.",
+        "recordings. Then come the three verdicts: the share of the images in which each is sure, "
+        "and how many of these are wrong. A shape is wrong if a joint is off by more than 30 cm "
+        f"beside the middle of the shoulders, a vertical if the pitch is by more than {FAR_DEG} "
+        "degrees, and a place if the middle of the shoulders is by more than 30 cm. With motions "
+        "of the camera, images count whose joints are in view with each of them.",
         table(_HEAD, rows),
         f"Made by `{results['command']}` at commit {results['provenance']['commit']}.",
     ]
     return "\n\n".join(parts) + "\n"
 
 
-_BEYOND = "of these beyond 30 cm, %"
+_VERDICTS = {
+    "shape": ("tracking", "tracking_beyond_30"),
+    "vertical": ("vertical", "vertical_wrong"),
+    "place": ("place", "place_wrong"),
+}
+"""Names of the numbers of images in which a verdict is sure, and sure and wrong."""
 _HEAD = (
-    *("film", "given", "aligned", "absolute", "MediaPipe aligned", "`tracking`, %", _BEYOND),
-    *("placed, %", _BEYOND, "without posture, %", "pitch found / true, degrees"),
+    *("film", "given", "aligned", "absolute", "MediaPipe aligned"),
+    *(head for name in _VERDICTS for head in (f"{name} sure, %", "of these wrong, %")),
+    *("without posture, %", "pitch found / true, degrees"),
 )
 
 
@@ -308,10 +327,11 @@ def _cells(name: str, films: Sequence[Mapping[str, Any]]) -> list[str]:
     return [
         *(name, str(films[0]["given"]), number(mean("aligned")), number(mean("absolute"))),
         number(mean("mediapipe_aligned", films)),
-        share("tracking", "frames"),
-        share("tracking_beyond_30", "tracking", "{:.1f}"),
-        share("placed", "frames"),
-        share("placed_beyond_30", "placed", "{:.1f}"),
+        *(
+            cell
+            for sure, wrong in _VERDICTS.values()
+            for cell in (share(sure, "frames"), share(wrong, sure, "{:.1f}"))
+        ),
         share("without_estimate", "frames"),
         f"{number(mean('pitch_found_deg'))} / {number(mean('pitch_deg'))}",
     ]

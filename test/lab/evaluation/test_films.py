@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -10,7 +12,8 @@ import pytest
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate
+from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Place
+from cardbox_tracker.tracking.place import STATURE
 from lab.evaluation.films import (
     SHAPES,
     film_figures,
@@ -66,11 +69,16 @@ def test_motions_are_compared_where_each_shows_all_joints(unmeasured: Path, tmp_
         assert (away < film.fov_deg / 2 + 1.0) == (session is kept)
 
 
-def test_figures_have_the_pitch_that_was_found(unmeasured: Path, tmp_path: Path) -> None:
+def test_figures_have_the_pitch_and_what_is_sure_and_wrong(
+    unmeasured: Path, tmp_path: Path
+) -> None:
     film = make_film(unmeasured, "across", tmp_path / "film.mp4")
     truth = dict(zip(film.session.stamps_ns.tolist(), film.session.keypoints_m, strict=True))
+    place = Place(np.full(3, 0.1), 0.0, STATURE)
+    known: dict[str, Any] = {"place": place, "pitch_stddev_rad": 0.1}
+    away = np.array([0.4, 0.0, 0.0])
     estimates = [
-        Estimate(TRACKING, np.zeros(12), keypoints_m=truth[stamp] + (0.0, 0.0, 0.1))
+        Estimate(TRACKING, np.zeros(12), keypoints_m=truth[stamp] + (0.0, 0.0, 0.1), **known)
         if stamp in truth
         else Estimate(NO_PERSON)
         for stamp in film.stamps_ns
@@ -81,7 +89,18 @@ def test_figures_have_the_pitch_that_was_found(unmeasured: Path, tmp_path: Path)
     assert found["aligned"] == pytest.approx(0.0, abs=1e-6)
     seen = len(set(truth) & set(film.stamps_ns))
     assert (found["tracking"], found["tracking_beyond_30"]) == (seen, 0)
+    verdicts = ("vertical", "vertical_wrong", "place", "place_wrong")
+    assert [found[name] for name in verdicts] == [seen, 0, seen, 0]
     assert found["pitch_found_deg"] == pytest.approx(9.0)
+    tilted = body.with_values(camera_pitch_rad=np.radians(found["pitch_deg"] + 11.0))
+    aside = [
+        one if one.keypoints_m is None else replace(one, keypoints_m=one.keypoints_m + away)
+        for one in estimates
+    ]
+    wrong = film_figures(film, aside, tilted)
+    assert [wrong[name] for name in verdicts] == [seen] * 4
+    unsure = [replace(one, place=None, pitch_stddev_rad=0.2) for one in aside]
+    assert [film_figures(film, unsure, tilted)[name] for name in verdicts] == [0] * 4
     entry = {
         "name": "waves, across",
         "group": "people",
