@@ -98,7 +98,7 @@ class Distances(NamedTuple):
     Attributes:
         times_s: times of the images, (n,).
         distances: level distance from the camera in each, statures, (n,).
-        stddev: standard deviation of the logarithm of all distances.
+        stddev: standard deviation of the mean of the logarithms of all distances.
     """
 
     times_s: FloatArray
@@ -232,9 +232,14 @@ def people_camera(
     if not np.isfinite(found).all():
         return None
     covariance: FloatArray = np.linalg.inv(fit.information[0]).astype(np.float64)
-    variances = np.diag(covariance)[last + 1]
+    far = last + 1
+    # The errors of single images count for what the mean of all has of them.
     distances = [
-        Distances(seen.times_s[its], np.exp(found[last + 1])[its], math.sqrt(variances[its].mean()))
+        Distances(
+            seen.times_s[its],
+            np.exp(found[far[its]]),
+            math.sqrt(covariance[np.ix_(far[its], far[its])].mean()),
+        )
         if (its := person == number).any()
         else None
         for number in range(len(statures))
