@@ -229,7 +229,9 @@ def scene_camera(
             lens = lens_of(
                 camera, Value(float(np.exp(known.values[3])), float(stddevs[1]), FOUND, by)
             )
-        distances = known.distances
+        share = found.stddev**2 / shown.covariance[0, 0]
+        pairs = zip(known.distances, shown.distances, strict=True)
+        distances = tuple(_by_pitch(one, other, share) for one, other in pairs)
         if given_m is not None and distance_m is None and distances[0] is not None:
             stature_m = statures_m[0] or USUAL_STATURE_M
             remarks += _contradiction(camera, distances[0], stature_m, given_m)
@@ -412,6 +414,17 @@ def lens_of(camera: Camera, factor: Value | None = None) -> Value:
     tangent = camera.width / 2 / (camera.fx * factor.mean)
     slope = 2 * tangent / (1 + tangent**2)
     return factor._replace(mean=2 * float(np.arctan(tangent)), stddev=slope * factor.stddev)
+
+
+def _by_pitch(known: Distances | None, free: Distances | None, share: float) -> Distances | None:
+    """Return distances with a ``known`` pitch as unsure as this pitch makes them.
+
+    Those with a ``free`` pitch are unsure by one whose variance times ``share`` is the pitch's.
+    """
+    if known is None or free is None:
+        return known
+    by_pitch = share * max(free.stddev**2 - known.stddev**2, 0.0)
+    return known._replace(stddev=math.sqrt(known.stddev**2 + by_pitch))
 
 
 def _contradiction(
