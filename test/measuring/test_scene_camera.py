@@ -125,6 +125,20 @@ def test_the_distance_is_as_sure_by_more_images_of_the_same_time() -> None:
     assert stddevs == pytest.approx([0.065] * 2, rel=0.15)
 
 
+def test_a_distance_is_as_unsure_as_the_pitch_makes_it() -> None:
+    sights = [[(at_s, replace(one, legs=None)) for at_s, one in film(STAND, 20.0)]]
+    seen = (sights, [(0.0, BLANK)], CAMERA, [STATURE_M])
+    stddevs = []
+    for stddev in (0.001, 0.05, 0.1):
+        (far,) = scene_camera(*seen, (np.radians(20.0), stddev)).distances
+        assert far is not None
+        stddevs.append(far.stddev)
+    sure, some, unsure = np.square(stddevs)
+    assert sure < some < unsure
+    # Variances grow with that of the pitch.
+    assert (unsure - sure) / (some - sure) == pytest.approx(4.0, rel=0.01)
+
+
 @pytest.mark.parametrize("places", [STAND, WALK], ids=["stands", "walks"])
 def test_without_feet_the_hips_are_marked_higher(
     places: Sequence[tuple[float, float]], monkeypatch: pytest.MonkeyPatch
