@@ -578,8 +578,8 @@ class _Person:
         They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
         is the deviation of a point, statures.
         """
-        sure = self._seen(unknowns)[1]
-        depth_m = self._before(unknowns, self._triangulated(unknowns))[..., 2]
+        at = self._at(unknowns)
+        sure, depth_m = at.sure, _before(at, _triangulated(at))[..., 2]
         is_seen = (sure > 0.0) & (depth_m > _NEAREST_M)
         count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
@@ -588,8 +588,8 @@ class _Person:
 
     def count(self, unknowns: FloatArray) -> float:
         """Return the number of residuals, each with its weight."""
-        sure = self._seen(unknowns)[1]
-        return self._moments.weight * float(2 * (sure > 0.0).sum() + self._are_whole(sure).sum())
+        at = self._at(unknowns)
+        return self._moments.weight * float(2 * (at.sure > 0.0).sum() + (at.bones > 0.0).sum())
 
     def residuals(self, unknowns: FloatArray) -> Residuals:
         """Return residuals at the points (m, 25, 3) with the least cost for the unknowns (n,).
@@ -599,21 +599,25 @@ class _Person:
         "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
         separate", 1973, as Kaufman shortens it).
         """
+        at = self._at(unknowns)
 
-        def of_points(places: FloatArray) -> Residuals:
-            errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
-            return geman_mcclure(errors, slopes)
+        def linearized(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+            places = values.reshape(-1, len(_NAMES), 3)
+            return self._errors(at, places), self._slopes(at, places)
 
-        begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
+        begun = _triangulated(at).reshape(len(self._moments.times_s), -1)
         rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
-        found = minimize({"points": of_points}, begun, rules, _INNER)
+        of_points = {"points": lambda values: geman_mcclure(*linearized(values))}
+        found = minimize(of_points, begun, rules, _INNER)
+        errors, slopes = linearized(found.values)
         places = found.values.reshape(-1, len(_NAMES), 3)
-        errors, slopes = self._linearized(unknowns, places)
         changes = np.zeros((*errors.shape, len(unknowns)))
         for number in self._own:
             moved = unknowns.copy()
             moved[number] += DIFFERENCE
-            changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
+            is_late = number < self._films and number % _OF_CAMERA == _OFFSET
+            there = self._at(moved, None if is_late else at)
+            changes[..., number] = (self._errors(there, places) - errors) / DIFFERENCE
         values, slopes, costs = geman_mcclure(errors, slopes)
         changes = geman_mcclure(errors, changes).jacobian
         made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
@@ -623,80 +627,84 @@ class _Person:
         total = self._moments.weight * costs.sum(keepdims=True)
         return Residuals(root * values.reshape(1, -1), root * jacobian, total)
 
-    def _poses(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return rotations (c, 3, 3), translations (c, 3) and offsets (c,) of all films."""
-        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
-        turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
-        return turns, films[:, _MOVE], films[:, _OFFSET]
+    def _at(self, unknowns: FloatArray, same: _At | None = None) -> _At:
+        """Return what the unknowns say; a point that fewer than two films show is not sure.
 
-    def _seen(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return rays (c, m, 25, 2), and how sure they are, (c, m, 25).
-
-        A point that fewer than two films show is not sure.
+        ``same`` has the same offsets.
         """
         one, shape = self._moments, (len(self._moments.times_s), len(_NAMES))
+        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
+        turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
+        poses = turns, films[:, _MOVE], np.exp(unknowns[self._lengths])
+        if same is not None:
+            return _At(*poses, *same[3:])
         seen = [
             (np.zeros((*shape, 2)), np.zeros(shape))
             if each is None
             else each.at(one.times_s - late_s)
-            for each, late_s in zip(one.seen, self._poses(unknowns)[2], strict=True)
+            for each, late_s in zip(one.seen, films[:, _OFFSET], strict=True)
         ]
         rays, sure = (np.array(each) for each in zip(*seen, strict=True))
-        return rays, sure * ((sure > 0.0).sum(axis=0) > 1)
+        sure *= (sure > 0.0).sum(axis=0) > 1
+        bones = (sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1) / (_BONE * one.stature_m)
+        return _At(*poses, rays, sure, bones)
 
-    def _are_whole(self, sure: FloatArray) -> BoolArray:
-        """Return which bones are seen, (m, b)."""
-        return np.asarray((sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1))
-
-    def _triangulated(self, unknowns: FloatArray) -> FloatArray:
-        """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
-        (turns, moves_m, _), (rays, sure) = self._poses(unknowns), self._seen(unknowns)
-        ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
-        ahead = np.einsum("cji,cmpj->cmpi", turns, ahead)
-        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-        across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
-        across *= (sure**2)[..., None, None]
-        centres = -np.einsum("cji,cj->ci", turns, moves_m)
-        right = np.einsum("cmpij,cj->mpi", across, centres)
-        loose = across.sum(axis=0) + 1e-9 * np.eye(3)
-        return np.linalg.solve(loose, right[..., None])[..., 0]
-
-    def _before(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
-        """Return the places in the optical frame of each film, (c, m, 25, 3)."""
-        turns, moves_m, _ = self._poses(unknowns)
-        there: FloatArray = np.einsum("cij,mpj->cmpi", turns, places) + moves_m[:, None, None]
-        return there
-
-    def _errors(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+    def _errors(self, at: _At, places: FloatArray) -> FloatArray:
         """Return the errors of rays, then of bones, in deviations, (m, r)."""
-        rays, sure = self._seen(unknowns)
-        there = self._before(unknowns, places)
-        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - rays
-        away *= self._scale * sure[..., None]
+        there = _before(at, places)
+        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - at.rays
+        away *= self._scale * at.sure[..., None]
         bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
-        off = np.linalg.norm(bones, axis=-1) - np.exp(unknowns[self._lengths])
-        off *= self._are_whole(sure) / (_BONE * self._moments.stature_m)
+        off = at.bones * (np.linalg.norm(bones, axis=-1) - at.lengths_m)
         return np.hstack([away.swapaxes(0, 1).reshape(len(places), -1), off])
 
-    def _linearized(
-        self, unknowns: FloatArray, places: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the errors (m, r), and their derivatives by the places, (m, r, 75)."""
-        turns, sure = self._poses(unknowns)[0], self._seen(unknowns)[1]
-        there = self._before(unknowns, places)
+    def _slopes(self, at: _At, places: FloatArray) -> FloatArray:
+        """Return the derivatives of the errors by the places, (m, r, 75)."""
+        there = _before(at, places)
         ahead = np.maximum(there[..., 2:], _NEAREST_M)
         by_there = np.zeros((*there.shape[:-1], 2, 3))
         by_there[..., :2] = np.eye(2)
         by_there[..., 2] = -there[..., :2] / ahead
-        by_there *= (self._scale * sure[..., None] / ahead)[..., None]
-        of_rays = np.zeros((len(places), len(turns), len(_NAMES), 2, len(_NAMES), 3))
-        each, bone = np.arange(len(_NAMES)), np.arange(len(_ENDS))
-        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, turns)
+        by_there *= (self._scale * at.sure[..., None] / ahead)[..., None]
+        films, points = len(at.turns), len(_NAMES)
+        rows = 2 * films * points
+        slopes = np.zeros((len(places), rows + len(_ENDS), 3 * points))
+        of_rays = slopes[:, :rows].reshape(-1, films, points, 2, points, 3)
+        of_bones = slopes[:, rows:].reshape(-1, len(_ENDS), points, 3)
+        each, bone = np.arange(points), np.arange(len(_ENDS))
+        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, at.turns)
         bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
         bones /= np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
-        bones *= (self._are_whole(sure) / (_BONE * self._moments.stature_m))[..., None]
-        of_bones = np.zeros((len(places), len(bone), len(_NAMES), 3))
+        bones *= at.bones[..., None]
         of_bones[:, bone, _ENDS[:, 0]], of_bones[:, bone, _ENDS[:, 1]] = bones, -bones
-        shape = len(places), -1, 3 * len(_NAMES)
-        slopes = np.hstack([of_rays.reshape(shape), of_bones.reshape(shape)])
-        return self._errors(unknowns, places), slopes
+        return slopes
+
+
+class _At(NamedTuple):
+    """What unknowns say of m images of one person before c films."""
+
+    turns: FloatArray  #: rotations of the films, (c, 3, 3)
+    moves_m: FloatArray  #: their translations, (c, 3)
+    lengths_m: FloatArray  #: of bones, (b,)
+    rays: FloatArray  #: (c, m, 25, 2)
+    sure: FloatArray  #: how sure these are, (c, m, 25)
+    bones: FloatArray  #: inverse deviations of the lengths of bones, 0 if unseen, 1/m, (m, b)
+
+
+def _triangulated(at: _At) -> FloatArray:
+    """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
+    ahead = np.concatenate([at.rays, np.ones((*at.rays.shape[:-1], 1))], axis=-1)
+    ahead = np.einsum("cji,cmpj->cmpi", at.turns, ahead)
+    ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+    across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
+    across *= (at.sure**2)[..., None, None]
+    centres = -np.einsum("cji,cj->ci", at.turns, at.moves_m)
+    right = np.einsum("cmpij,cj->mpi", across, centres)
+    loose = across.sum(axis=0) + 1e-9 * np.eye(3)
+    return np.linalg.solve(loose, right[..., None])[..., 0]
+
+
+def _before(at: _At, places: FloatArray) -> FloatArray:
+    """Return the places in the optical frame of each film, (c, m, 25, 3)."""
+    there: FloatArray = np.einsum("cij,mpj->cmpi", at.turns, places) + at.moves_m[:, None, None]
+    return there
