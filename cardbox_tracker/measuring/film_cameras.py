@@ -23,9 +23,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import linear_sum_assignment
-from scipy.signal import correlate
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
@@ -38,6 +35,7 @@ from cardbox_tracker.common.least_squares import (
     minimize,
     rules_of,
 )
+from cardbox_tracker.detectors.identity import OTHER, cheapest
 from cardbox_tracker.detectors.image_points import (
     CERTAIN,
     LEG_POINT_NAMES,
@@ -141,9 +139,10 @@ class Seen:
         """Return vertical speeds (m, 25), in deviations, every ``step_s``, and 1 where known."""
         rays, sure = self.at(np.arange(self.times_s[0], self.times_s[-1], step_s))
         known, width = sure > 0.0, max(_SMOOTH_S / step_s, 0.5)
+        down = (1, 2 * round(4.0 * width) + 1), 1.0
         smooth, weight = (
-            gaussian_filter1d(np.where(known, values, 0.0), width, axis=0, mode="constant")
-            for values in (rays[..., 1], 1.0)
+            cv2.GaussianBlur(values, *down, sigmaY=width, borderType=cv2.BORDER_CONSTANT)
+            for values in (np.where(known, rays[..., 1], 0.0), known.astype(np.float64))
         )
         speeds = np.diff(smooth / np.maximum(weight, 1e-6), axis=0)
         known = known[1:] & known[:-1]
@@ -339,9 +338,11 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
     (ours, ours_known), (theirs, theirs_known) = one.speeds(step_s), other.speeds(step_s)
 
     def summed(a: FloatArray, b: FloatArray) -> FloatArray:
-        pairs = zip(a.T, b.T, strict=True)
-        found: FloatArray = np.sum([correlate(*pair, method="fft") for pair in pairs], axis=0)
-        return found
+        """Return the sum of the correlations of the columns, from the lag 1 - len(b) on."""
+        size = len(a) + len(b) - 1
+        spectra = [np.fft.rfft(one, size, axis=0) for one in (a, b)]
+        found = np.fft.irfft((spectra[0] * spectra[1].conj()).sum(axis=1), size)
+        return np.roll(found, len(b) - 1)
 
     count = summed(ours_known, theirs_known)
     norm = summed(ours**2, theirs_known) * summed(ours_known, theirs**2)
@@ -382,12 +383,12 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
             gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
-        pairs = sorted(zip(*linear_sum_assignment(-gains), strict=True), key=lambda at: -gains[at])
+        pairs = sorted(cheapest((OTHER - gains).tolist()).items(), key=lambda at: -gains[at])
         # Chance gives each of them its own.
         together = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
         if together.max(initial=0.0) > (0.0 if is_given else _SURE):
             most = int(np.argmax(together))
-            same = {int(a): int(b) for a, b in pairs[: most + 1]}
+            same = dict(pairs[: most + 1])
             who = tuple(same.get(a) for a in range(len(first.people)))
             found.append((float(together[most]), offset_s, who))
     taken = list[float]()
