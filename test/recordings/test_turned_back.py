@@ -116,9 +116,7 @@ def turned(shaken: Path) -> Turned:
     return found[0]
 
 
-def test_points_of_turned_images_are_those_of_a_still_camera(
-    shaken: Path, turned: Turned
-) -> None:
+def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path, turned: Turned) -> None:
     asked = request(shaken)
     assert turned.found.unknown == 0 and "turns by up to" in turned.remark
     with asked.turned_back(turned).open() as source:
