@@ -20,7 +20,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import brightness_of
@@ -105,6 +104,8 @@ def turning_lens(
     The length is in those of the ``camera``. ``frames`` are images and silhouettes of
     :func:`follow_turns`. None if other lenses fit as well, or edges agree on no rotation.
     """
+    # Its import takes a quarter of the time in which a command starts.
+    from scipy.optimize import minimize_scalar
 
     def seen(log_length: float) -> _Map:
         lens = exp(log_length)

@@ -23,9 +23,6 @@ from typing import NamedTuple
 import cv2
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter1d
-from scipy.optimize import linear_sum_assignment
-from scipy.signal import correlate
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
@@ -38,6 +35,7 @@ from cardbox_tracker.common.least_squares import (
     minimize,
     rules_of,
 )
+from cardbox_tracker.detectors.identity import OTHER, cheapest
 from cardbox_tracker.detectors.image_points import (
     CERTAIN,
     LEG_POINT_NAMES,
@@ -141,9 +139,10 @@ class Seen:
         """Return vertical speeds (m, 25), in deviations, every ``step_s``, and 1 where known."""
         rays, sure = self.at(np.arange(self.times_s[0], self.times_s[-1], step_s))
         known, width = sure > 0.0, max(_SMOOTH_S / step_s, 0.5)
+        down = (1, 2 * round(4.0 * width) + 1), 1.0
         smooth, weight = (
-            gaussian_filter1d(np.where(known, values, 0.0), width, axis=0, mode="constant")
-            for values in (rays[..., 1], 1.0)
+            cv2.GaussianBlur(values, *down, sigmaY=width, borderType=cv2.BORDER_CONSTANT)
+            for values in (np.where(known, rays[..., 1], 0.0), known.astype(np.float64))
         )
         speeds = np.diff(smooth / np.maximum(weight, 1e-6), axis=0)
         known = known[1:] & known[:-1]
@@ -339,9 +338,11 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
     (ours, ours_known), (theirs, theirs_known) = one.speeds(step_s), other.speeds(step_s)
 
     def summed(a: FloatArray, b: FloatArray) -> FloatArray:
-        pairs = zip(a.T, b.T, strict=True)
-        found: FloatArray = np.sum([correlate(*pair, method="fft") for pair in pairs], axis=0)
-        return found
+        """Return the sum of the correlations of the columns, from the lag 1 - len(b) on."""
+        size = len(a) + len(b) - 1
+        spectra = [np.fft.rfft(one, size, axis=0) for one in (a, b)]
+        found = np.fft.irfft((spectra[0] * spectra[1].conj()).sum(axis=1), size)
+        return np.roll(found, len(b) - 1)
 
     count = summed(ours_known, theirs_known)
     norm = summed(ours**2, theirs_known) * summed(ours_known, theirs**2)
@@ -382,12 +383,12 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
             gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
-        pairs = sorted(zip(*linear_sum_assignment(-gains), strict=True), key=lambda at: -gains[at])
+        pairs = sorted(cheapest((OTHER - gains).tolist()).items(), key=lambda at: -gains[at])
         # Chance gives each of them its own.
         together = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
         if together.max(initial=0.0) > (0.0 if is_given else _SURE):
             most = int(np.argmax(together))
-            same = {int(a): int(b) for a, b in pairs[: most + 1]}
+            same = dict(pairs[: most + 1])
             who = tuple(same.get(a) for a in range(len(first.people)))
             found.append((float(together[most]), offset_s, who))
     taken = list[float]()
@@ -578,8 +579,8 @@ class _Person:
         They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
         is the deviation of a point, statures.
         """
-        sure = self._seen(unknowns)[1]
-        depth_m = self._before(unknowns, self._triangulated(unknowns))[..., 2]
+        at = self._at(unknowns)
+        sure, depth_m = at.sure, _before(at, _triangulated(at))[..., 2]
         is_seen = (sure > 0.0) & (depth_m > _NEAREST_M)
         count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
@@ -588,8 +589,8 @@ class _Person:
 
     def count(self, unknowns: FloatArray) -> float:
         """Return the number of residuals, each with its weight."""
-        sure = self._seen(unknowns)[1]
-        return self._moments.weight * float(2 * (sure > 0.0).sum() + self._are_whole(sure).sum())
+        at = self._at(unknowns)
+        return self._moments.weight * float(2 * (at.sure > 0.0).sum() + (at.bones > 0.0).sum())
 
     def residuals(self, unknowns: FloatArray) -> Residuals:
         """Return residuals at the points (m, 25, 3) with the least cost for the unknowns (n,).
@@ -599,21 +600,25 @@ class _Person:
         "The differentiation of pseudo-inverses and nonlinear least squares problems whose variables
         separate", 1973, as Kaufman shortens it).
         """
+        at = self._at(unknowns)
 
-        def of_points(places: FloatArray) -> Residuals:
-            errors, slopes = self._linearized(unknowns, places.reshape(-1, len(_NAMES), 3))
-            return geman_mcclure(errors, slopes)
+        def linearized(values: FloatArray) -> tuple[FloatArray, FloatArray]:
+            places = values.reshape(-1, len(_NAMES), 3)
+            return self._errors(at, places), self._slopes(at, places)
 
-        begun = self._triangulated(unknowns).reshape(len(self._moments.times_s), -1)
+        begun = _triangulated(at).reshape(len(self._moments.times_s), -1)
         rules = rules_of(begun.shape[1], mean=begun, inverse=_LOOSE)
-        found = minimize({"points": of_points}, begun, rules, _INNER)
+        of_points = {"points": lambda values: geman_mcclure(*linearized(values))}
+        found = minimize(of_points, begun, rules, _INNER)
+        errors, slopes = linearized(found.values)
         places = found.values.reshape(-1, len(_NAMES), 3)
-        errors, slopes = self._linearized(unknowns, places)
         changes = np.zeros((*errors.shape, len(unknowns)))
         for number in self._own:
             moved = unknowns.copy()
             moved[number] += DIFFERENCE
-            changes[..., number] = (self._errors(moved, places) - errors) / DIFFERENCE
+            is_late = number < self._films and number % _OF_CAMERA == _OFFSET
+            there = self._at(moved, None if is_late else at)
+            changes[..., number] = (self._errors(there, places) - errors) / DIFFERENCE
         values, slopes, costs = geman_mcclure(errors, slopes)
         changes = geman_mcclure(errors, changes).jacobian
         made_up = np.linalg.solve(found.information, slopes.swapaxes(1, 2) @ changes)
@@ -623,80 +628,84 @@ class _Person:
         total = self._moments.weight * costs.sum(keepdims=True)
         return Residuals(root * values.reshape(1, -1), root * jacobian, total)
 
-    def _poses(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Return rotations (c, 3, 3), translations (c, 3) and offsets (c,) of all films."""
-        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
-        turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
-        return turns, films[:, _MOVE], films[:, _OFFSET]
+    def _at(self, unknowns: FloatArray, same: _At | None = None) -> _At:
+        """Return what the unknowns say; a point that fewer than two films show is not sure.
 
-    def _seen(self, unknowns: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return rays (c, m, 25, 2), and how sure they are, (c, m, 25).
-
-        A point that fewer than two films show is not sure.
+        ``same`` has the same offsets.
         """
         one, shape = self._moments, (len(self._moments.times_s), len(_NAMES))
+        films = np.vstack([np.zeros(_OF_CAMERA), unknowns[: self._films].reshape(-1, _OF_CAMERA)])
+        turns = np.array([cv2.Rodrigues(film[_TURN].copy())[0] for film in films])
+        poses = turns, films[:, _MOVE], np.exp(unknowns[self._lengths])
+        if same is not None:
+            return _At(*poses, *same[3:])
         seen = [
             (np.zeros((*shape, 2)), np.zeros(shape))
             if each is None
             else each.at(one.times_s - late_s)
-            for each, late_s in zip(one.seen, self._poses(unknowns)[2], strict=True)
+            for each, late_s in zip(one.seen, films[:, _OFFSET], strict=True)
         ]
         rays, sure = (np.array(each) for each in zip(*seen, strict=True))
-        return rays, sure * ((sure > 0.0).sum(axis=0) > 1)
+        sure *= (sure > 0.0).sum(axis=0) > 1
+        bones = (sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1) / (_BONE * one.stature_m)
+        return _At(*poses, rays, sure, bones)
 
-    def _are_whole(self, sure: FloatArray) -> BoolArray:
-        """Return which bones are seen, (m, b)."""
-        return np.asarray((sure.max(axis=0)[:, _ENDS] > 0.0).all(axis=-1))
-
-    def _triangulated(self, unknowns: FloatArray) -> FloatArray:
-        """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
-        (turns, moves_m, _), (rays, sure) = self._poses(unknowns), self._seen(unknowns)
-        ahead = np.concatenate([rays, np.ones((*rays.shape[:-1], 1))], axis=-1)
-        ahead = np.einsum("cji,cmpj->cmpi", turns, ahead)
-        ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
-        across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
-        across *= (sure**2)[..., None, None]
-        centres = -np.einsum("cji,cj->ci", turns, moves_m)
-        right = np.einsum("cmpij,cj->mpi", across, centres)
-        loose = across.sum(axis=0) + 1e-9 * np.eye(3)
-        return np.linalg.solve(loose, right[..., None])[..., 0]
-
-    def _before(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
-        """Return the places in the optical frame of each film, (c, m, 25, 3)."""
-        turns, moves_m, _ = self._poses(unknowns)
-        there: FloatArray = np.einsum("cij,mpj->cmpi", turns, places) + moves_m[:, None, None]
-        return there
-
-    def _errors(self, unknowns: FloatArray, places: FloatArray) -> FloatArray:
+    def _errors(self, at: _At, places: FloatArray) -> FloatArray:
         """Return the errors of rays, then of bones, in deviations, (m, r)."""
-        rays, sure = self._seen(unknowns)
-        there = self._before(unknowns, places)
-        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - rays
-        away *= self._scale * sure[..., None]
+        there = _before(at, places)
+        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - at.rays
+        away *= self._scale * at.sure[..., None]
         bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
-        off = np.linalg.norm(bones, axis=-1) - np.exp(unknowns[self._lengths])
-        off *= self._are_whole(sure) / (_BONE * self._moments.stature_m)
+        off = at.bones * (np.linalg.norm(bones, axis=-1) - at.lengths_m)
         return np.hstack([away.swapaxes(0, 1).reshape(len(places), -1), off])
 
-    def _linearized(
-        self, unknowns: FloatArray, places: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Return the errors (m, r), and their derivatives by the places, (m, r, 75)."""
-        turns, sure = self._poses(unknowns)[0], self._seen(unknowns)[1]
-        there = self._before(unknowns, places)
+    def _slopes(self, at: _At, places: FloatArray) -> FloatArray:
+        """Return the derivatives of the errors by the places, (m, r, 75)."""
+        there = _before(at, places)
         ahead = np.maximum(there[..., 2:], _NEAREST_M)
         by_there = np.zeros((*there.shape[:-1], 2, 3))
         by_there[..., :2] = np.eye(2)
         by_there[..., 2] = -there[..., :2] / ahead
-        by_there *= (self._scale * sure[..., None] / ahead)[..., None]
-        of_rays = np.zeros((len(places), len(turns), len(_NAMES), 2, len(_NAMES), 3))
-        each, bone = np.arange(len(_NAMES)), np.arange(len(_ENDS))
-        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, turns)
+        by_there *= (self._scale * at.sure[..., None] / ahead)[..., None]
+        films, points = len(at.turns), len(_NAMES)
+        rows = 2 * films * points
+        slopes = np.zeros((len(places), rows + len(_ENDS), 3 * points))
+        of_rays = slopes[:, :rows].reshape(-1, films, points, 2, points, 3)
+        of_bones = slopes[:, rows:].reshape(-1, len(_ENDS), points, 3)
+        each, bone = np.arange(points), np.arange(len(_ENDS))
+        of_rays[:, :, each, :, each] = np.einsum("cmpij,cjk->pmcik", by_there, at.turns)
         bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
         bones /= np.maximum(np.linalg.norm(bones, axis=-1, keepdims=True), 1e-9)
-        bones *= (self._are_whole(sure) / (_BONE * self._moments.stature_m))[..., None]
-        of_bones = np.zeros((len(places), len(bone), len(_NAMES), 3))
+        bones *= at.bones[..., None]
         of_bones[:, bone, _ENDS[:, 0]], of_bones[:, bone, _ENDS[:, 1]] = bones, -bones
-        shape = len(places), -1, 3 * len(_NAMES)
-        slopes = np.hstack([of_rays.reshape(shape), of_bones.reshape(shape)])
-        return self._errors(unknowns, places), slopes
+        return slopes
+
+
+class _At(NamedTuple):
+    """What unknowns say of m images of one person before c films."""
+
+    turns: FloatArray  #: rotations of the films, (c, 3, 3)
+    moves_m: FloatArray  #: their translations, (c, 3)
+    lengths_m: FloatArray  #: of bones, (b,)
+    rays: FloatArray  #: (c, m, 25, 2)
+    sure: FloatArray  #: how sure these are, (c, m, 25)
+    bones: FloatArray  #: inverse deviations of the lengths of bones, 0 if unseen, 1/m, (m, b)
+
+
+def _triangulated(at: _At) -> FloatArray:
+    """Return the places (m, 25, 3) with the least sums of squared distances from the rays."""
+    ahead = np.concatenate([at.rays, np.ones((*at.rays.shape[:-1], 1))], axis=-1)
+    ahead = np.einsum("cji,cmpj->cmpi", at.turns, ahead)
+    ahead /= np.linalg.norm(ahead, axis=-1, keepdims=True)
+    across = np.eye(3) - ahead[..., :, None] * ahead[..., None, :]
+    across *= (at.sure**2)[..., None, None]
+    centres = -np.einsum("cji,cj->ci", at.turns, at.moves_m)
+    right = np.einsum("cmpij,cj->mpi", across, centres)
+    loose = across.sum(axis=0) + 1e-9 * np.eye(3)
+    return np.linalg.solve(loose, right[..., None])[..., 0]
+
+
+def _before(at: _At, places: FloatArray) -> FloatArray:
+    """Return the places in the optical frame of each film, (c, m, 25, 3)."""
+    there: FloatArray = np.einsum("cij,mpj->cmpi", at.turns, places) + at.moves_m[:, None, None]
+    return there

@@ -11,10 +11,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.person.posture import N_STATE, TORSO_X, TORSO_Y
+from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.search.joint_moves import clip_state
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.term import Frame, Silhouette
 
@@ -103,7 +101,6 @@ class Approach:
         return kept
 
 
-@kernel
 def at_distances(
     state: FloatArray, distances_m: FloatArray, body_m: float, limits: FloatArray
 ) -> FloatArray:
@@ -112,15 +109,10 @@ def at_distances(
     ``distances_m`` (N,) and ``body_m``, that of the body model, are those of the hips; ``limits``
     (14, 2) are those of a state.
     """
-    states = np.empty((distances_m.shape[0], N_STATE))
-    ahead_m = max(body_m - state[TORSO_X], 1e-3)
-    for i in range(states.shape[0]):
-        for d in range(N_STATE):
-            states[i, d] = state[d]
-        states[i, TORSO_X] = body_m - distances_m[i]
-        states[i, TORSO_Y] = state[TORSO_Y] * (distances_m[i] / ahead_m)
-        clip_state(states[i], limits)
-    return states
+    states = np.repeat(state[None], len(distances_m), axis=0)
+    states[:, TORSO_X] = body_m - distances_m
+    states[:, TORSO_Y] *= distances_m / max(body_m - float(state[TORSO_X]), 1e-3)
+    return np.clip(states, *limits.T)
 
 
 def placed_upright(

@@ -9,14 +9,11 @@ well; without this, a corner that a lamp made foreground would stay foreground a
 
 from __future__ import annotations
 
-from typing import Any
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.segmentation.chroma import DARKEST, bgr_of
 from cardbox_tracker.segmentation.regions import SQUARE, flooded
 from cardbox_tracker.segmentation.window import Window
@@ -81,7 +78,6 @@ class LightFollower:
             )
         self._prepare(mean, chroma)
         self._samples = np.empty(self._small.shape, np.uint8)
-        self._cells = np.zeros((*_CELLS[::-1], 2), np.float32)
         self.restart()
 
     def replace(self, mean: FloatImage, chroma: FloatImage | None = None) -> None:
@@ -188,8 +184,8 @@ class LightFollower:
             person = cv2.dilate(known, SQUARE, iterations=2).reshape(person.shape)
         if self._settling > 0 or self._is_lit:
             rate, tolerance = 1.0, _TOLERANCE_AFTER_STEP
-        self._sum_cells(around, person, tolerance)
-        cells = np.asarray(cv2.sepFilter2D(self._cells, -1, _GAUSSIAN, _GAUSSIAN), np.float32)
+        cells = self._cells(around, person, tolerance)
+        cells = np.asarray(cv2.sepFilter2D(cells, -1, _GAUSSIAN, _GAUSSIAN), np.float32)
         # Cells without known pixels do not change.
         goal = self._base * (1.0 + cells[..., 0] / (cells[..., 1] + np.float32(_DOUBT)))
         self._field += np.float32(rate) * (goal - self._field)
@@ -223,8 +219,8 @@ class LightFollower:
         middle = len(found) // 2
         return float(np.partition(found, middle)[middle]) if len(found) else -1.0
 
-    def _sum_cells(self, around: FloatImage, person: ImageArray, tolerance: float) -> None:
-        """Write each cell's mean change times its share of usable pixels, and that share.
+    def _cells(self, around: FloatImage, person: ImageArray, tolerance: float) -> FloatImage:
+        """Return each cell's mean change times its share of usable pixels, and that share.
 
         Pixels that differ from the expected factors ``around`` (h, w) by more than the fraction
         ``tolerance``, and those of the ``person`` (h, w), are not used.
@@ -236,13 +232,10 @@ class LightFollower:
             is_cut_off = ratios * self._small_brightest >= _CUT_OFF
         # A saturated pixel gives only a lower bound.
         is_known = ~is_cut_off | ((change > 0) & (self._small_brightest < np.inf))
-        v, u = np.nonzero((person == 0) & is_known & (np.abs(change) < np.float32(tolerance)))
-        rows, columns = self._cells.shape[:2]
-        height, width = self._small.shape
-        share = np.float32(rows * columns / (height * width))
-        changes = share * ((relative / self._base_fine)[v, u].astype(np.float64) - 1.0)
-        self._cells[:] = 0
-        _add(v * rows // height, u * columns // width, changes, share, self._cells)
+        is_used = (person == 0) & is_known & (np.abs(change) < np.float32(tolerance))
+        changes = np.where(is_used, relative / self._base_fine - np.float32(1), np.float32(0))
+        both = np.dstack([changes, is_used.astype(np.float32)])
+        return np.asarray(cv2.resize(both, _CELLS, interpolation=cv2.INTER_AREA))
 
     def _fine_of(self, field: FloatImage) -> FloatImage:
         """Return a field at the resolution of the samples, (h, w)."""
@@ -254,11 +247,8 @@ class LightFollower:
         if self._highest_field < 1.0 + _SAME and lowest > 1.0 - _SAME:
             self._relative = self._mean
             return
-        near, far, share = _neighbours(self._mean.shape[1], self._field.shape[1])
-        wide = self._field[:, near] + share * (self._field[:, far] - self._field[:, near])
-        near, far, share = _neighbours(self._mean.shape[0], self._field.shape[0])
-        upper, lower = wide[near], wide[far]
-        np.multiply(self._mean, upper + share[:, None] * (lower - upper), out=self._scaled)
+        field = cv2.resize(self._field, self._mean.shape[::-1])
+        np.multiply(self._mean, field, out=self._scaled)
         self._relative = self._scaled
 
     def exclude(self, silhouette: ImageArray, window: Window | None = None) -> None:
@@ -297,19 +287,3 @@ class LightFollower:
         smooth = is_hidden & flooded(~is_hidden, is_even)
         self._lit = smooth & (relative > 1.0)
         return smooth
-
-
-@kernel
-def _add(rows: Any, columns: Any, changes: Any, share: Any, cells: Any) -> None:
-    """Add changes (n,) and shares of pixels to their cells, one after another."""
-    for i in range(len(changes)):
-        cell = cells[rows[i], columns[i]]
-        cell[0] += changes[i]
-        cell[1] += share
-
-
-def _neighbours(length: int, cells: int) -> tuple[NDArray[np.intp], NDArray[np.intp], FloatImage]:
-    """Return the two cells around each of ``length`` pixels, and the share of the second one."""
-    place = np.clip((np.arange(length) + 0.5) * cells / length - 0.5, 0.0, cells - 1.0)
-    near = place.astype(np.intp)
-    return near, np.minimum(near + 1, cells - 1), (place - near).astype(np.float32)

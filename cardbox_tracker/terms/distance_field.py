@@ -1,8 +1,8 @@
-"""Compiled signed distances of pixels from the outline of a mask, up to ``FAR_PX``.
+"""Compiled signed distances of pixels from the outline of a mask, up to ``FAR``.
 
 The distances are Euclidean, between pixel centres. They are computed in two passes after
 Felzenszwalb and Huttenlocher ("Distance Transforms of Sampled Functions", 2012): along the columns,
-then along the rows as the least of nearby squared distances. The limit ``FAR_PX`` keeps all loops
+then along the rows as the least of nearby squared distances. The limit ``FAR`` keeps all loops
 short and free of branches, and squared distances within 8 bits, of which many fit into a vector.
 OpenCV's ``distanceTransform`` computes one side per call and is slower.
 """
@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.compiling import kernel
-from cardbox_tracker.terms.outline_distances import FAR_PX
 
 # With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
-FAR = int(FAR_PX)
+FAR = 10
+"""Limit of the distances, px."""
 # Columns that a loop processes at once; a constant number leaves no rest for slower code.
 _LANES = 64
 
@@ -32,7 +32,7 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
     """Write the distance of each pixel from the nearest pixel of the other side, px.
 
     The mask (H, W) is 0 outside and 1 inside. The distances (H, :func:`padded_width` (W)), negative
-    inside and limited to ``FAR_PX``, have ``FAR`` columns more to the left of the mask, and ``FAR``
+    inside and limited to ``FAR``, have ``FAR`` columns more to the left of the mask, and ``FAR``
     or more to its right, where the mask continues as in its outermost columns.
     """
     height, width = mask.shape

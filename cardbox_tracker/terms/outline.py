@@ -124,7 +124,7 @@ def signed_distances(
 ) -> tuple[int, int, NDArray[np.float32], FloatArray]:
     """Return the distances of pixels from the outline of a silhouette (H, W), negative inside.
 
-    They are limited to ``FAR_PX``. First come column and row of the window around the foreground
+    They are limited to ``FAR``. First come column and row of the window around the foreground
     above ``end_row``, then the distances there, px; empty without foreground, or with a single row
     above ``end_row``. Last come first and last column, first and end row of the window's part that
     counts, (4,), px.

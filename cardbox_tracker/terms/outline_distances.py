@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import WORKING_SIZE, Camera
 from cardbox_tracker.person.posture import ARM_ANGLES
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.terms.distance_field import FAR, padded_width, signed_distances_of
 from cardbox_tracker.terms.term import Silhouette
 
-HALF_PX, FAR_PX = 5.0, 10.0
-"""Distance with a quarter of the weight, and limit of the distances."""
+HALF_PX = 5.0
+"""Distance with a quarter of the weight."""
 
 # Distance between neighbouring points of the grid, px.
 _GRID = 4
@@ -57,7 +58,7 @@ class SeenOutline:
         """
         size = camera.width, camera.height
         grey = cv2.resize(np.asarray(silhouette, np.uint8), size, interpolation=cv2.INTER_AREA)
-        mask = np.where(np.asarray(grey) > 127, 255, 0).astype(np.uint8)
+        mask = (np.asarray(grey) > 127).astype(np.uint8)
         row = camera.fy * float(hips_m[1]) / max(float(hips_m[2]), 1e-3) + camera.cy
         end = int(np.clip(row - ABOVE_HIPS_PX, 1, camera.height))
         columns, rows = (np.flatnonzero(mask[:end].any(axis=axis)) for axis in (0, 1))
@@ -68,7 +69,7 @@ class SeenOutline:
             right = min(camera.width, int(columns[-1]) + _MARGIN_PX)
             top = max(0, int(rows[0]) - _MARGIN_PX)
         # Outlines below the last row still affect the distances above it.
-        bottom = min(camera.height, end + int(FAR_PX))
+        bottom = min(camera.height, end + FAR)
         self.camera = replace(
             camera, width=right - left, height=bottom - top, cx=camera.cx - left, cy=camera.cy - top
         )
@@ -79,14 +80,11 @@ class SeenOutline:
         """Return the distances, px, from the outline of patches (n, 4, 3) in the optical frame."""
         image = np.zeros((self.camera.height, self.camera.width), np.uint8)
         for patch in np.rint(16.0 * self.camera.project(corners_m)).astype(np.int32):
-            cv2.fillConvexPoly(image, cv2.convexHull(patch), 255, cv2.LINE_8, 4)
+            cv2.fillConvexPoly(image, cv2.convexHull(patch), 1, cv2.LINE_8, 4)
         return self._distances(image, _TOO_WIDE_PX)
 
     def _distances(self, mask: NDArray[np.uint8], too_wide_px: float) -> FloatArray:
-        outside, inside = (
-            cv2.distanceTransform(np.ascontiguousarray(side), cv2.DIST_L2, 3)
-            for side in (255 - mask, mask)
-        )
-        signed = (outside - inside)[: self._rows : _GRID, ::_GRID] + too_wide_px
-        distances: FloatArray = np.clip(signed, -FAR_PX, FAR_PX).ravel().astype(np.float64)
-        return distances
+        distances = np.empty((len(mask), padded_width(mask.shape[1])), np.float32)
+        signed_distances_of(np.ascontiguousarray(mask), distances)
+        inside = distances[: self._rows : _GRID, FAR : FAR + mask.shape[1] : _GRID]
+        return np.minimum(inside.ravel().astype(np.float64) + too_wide_px, FAR)

@@ -6,14 +6,12 @@ The masks are drawn on a grid of square cells, about 80 in a row of the image.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import NEAREST_M, Camera
-from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X
@@ -197,50 +195,9 @@ class PersonDrawer:
 
 def grown(mask: Mask, cells: float) -> Mask:
     """Return a mask (h, w), 0 or 1, dilated by a disc whose radius is ``cells``, at most 40."""
-    radius = max(0, min(round(cells), _WIDEST))
-    found: Mask = np.zeros_like(mask)
-    nearest = np.empty_like(mask)
-    _dilate(mask, _reaches_of(radius), nearest, found)
-    return found
-
-
-@cache
-def _reaches_of(radius: int) -> NDArray[np.uint8]:
-    """Return how far a disc of 2 ``radius`` + 1 rows reaches to either side, in cells."""
-    wide = 2 * radius + 1
-    disc = np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide)))
-    reaches: NDArray[np.uint8] = (np.count_nonzero(disc, axis=1) // 2).astype(np.uint8)
-    return reaches
-
-
-@kernel
-def _dilate(mask: Mask, reaches: NDArray[np.uint8], nearest: Mask, found: Mask) -> None:
-    """Add the dilation of ``mask`` (h, w) to ``found``; ``nearest`` (h, w) is scratch memory.
-
-    It becomes the distance of each cell to the nearest one of its row that is 1.
-    """
-    height, width = mask.shape
-    radius = len(reaches) // 2
-    far = np.uint8(255)
-    first, last = height, -1
-    for v in range(height):
-        away, is_empty = far, True
-        for u in range(width):
-            away = np.uint8(0) if mask[v, u] else away + np.uint8(away < far)
-            nearest[v, u] = away
-            is_empty &= mask[v, u] == 0
-        if is_empty:
-            continue
-        first, last = min(first, v), v
-        for u in range(width - 2, -1, -1):
-            nearest[v, u] = min(nearest[v, u], nearest[v, u + 1] + np.uint8(1))
-    for v in range(first, last + 1):
-        if nearest[v, 0] == far:
-            continue
-        for i in range(max(radius - v, 0), min(radius + height - v, len(reaches))):
-            reach, row = reaches[i], v + i - radius
-            for u in range(width):
-                found[row, u] |= np.uint8(nearest[v, u] <= reach)
+    wide = 2 * max(0, min(round(cells), _WIDEST)) + 1
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
+    return np.asarray(cv2.dilate(mask, disc), np.uint8)
 
 
 def _whole(place: Point) -> tuple[int, int]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import asdict
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+
+from joblib import Parallel, delayed
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import make_folder, write_file
@@ -57,7 +57,7 @@ def evaluate_sessions(
         folders: sessions, each with ``bag/`` and ``ground_truth.json``.
         output: folder of the results; made if it is missing.
         plan: settings.
-        jobs: number of processes.
+        jobs: number of processes; 1 stays in this one.
         progress: called with the finished fraction.
 
     Returns:
@@ -72,16 +72,13 @@ def evaluate_sessions(
     make_folder(output)
     compile_all()
     sessions: dict[str, list[dict[str, Any]]] = {kind: [] for kind in kinds.values()}
-    with ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool:
-        work = [
-            (kinds[folder], pool.submit(evaluate_session, way, plan))
-            for folder in folders
-            for way in ways[folder]
-        ]
-        for done, (kind, future) in enumerate(work, 1):
-            sessions[kind].append(future.result())
-            if progress is not None:
-                progress(done / len(work))
+    work = [(kinds[folder], way) for folder in folders for way in ways[folder]]
+    parallel = Parallel(jobs, return_as="generator", batch_size=1)
+    found = parallel(delayed(evaluate_session)(way, plan) for _, way in work)
+    for done, ((kind, _), one) in enumerate(zip(work, found, strict=True), 1):
+        sessions[kind].append(one)
+        if progress is not None:
+            progress(done / len(work))
     results = {}
     for kind, found in sessions.items():
         names = " ".join(folder.name for folder in folders if kinds[folder] == kind)

@@ -8,17 +8,16 @@ truth is turned with them.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from functools import partial
 from math import sin
-from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, NamedTuple
 
 import cv2
 import numpy as np
+from joblib import Parallel, delayed
 from numpy.typing import NDArray
 
 from cardbox_tracker.applications.drawing.video import video_file
@@ -352,7 +351,7 @@ def evaluate_films(
         report: Markdown file to write.
         preset: name of the tracker's settings.
         seeds: seeds of the runs.
-        jobs: number of processes.
+        jobs: number of processes; 1 stays in this one.
         is_moving: whether the camera also turns, in films across.
 
     Raises:
@@ -366,17 +365,12 @@ def evaluate_films(
     kinds = [(shape, "still") for shape in SHAPES]
     if is_moving:
         kinds = [("across", motion) for motion in MOTIONS]
-    with (
-        progress_bar("evaluate") as show,
-        ProcessPoolExecutor(jobs, mp_context=get_context("spawn")) as pool,
-    ):
-        work = [
-            pool.submit(_film, folder, shape, motion, preset, seeds, is_moving)
-            for folder in folders
-            for shape, motion in kinds
-        ]
-        for done, future in enumerate(work, 1):
-            films += future.result()
+    work = [(folder, *kind) for folder in folders for kind in kinds]
+    parallel = Parallel(jobs, return_as="generator", batch_size=1)
+    with progress_bar("evaluate") as show:
+        found = parallel(delayed(_film)(*one, preset, seeds, is_moving) for one in work)
+        for done, entries in enumerate(found, 1):
+            films += entries
             show(done / len(work))
     names = " ".join(folder.name for folder in folders)
     how = f"--preset {preset} --seed {seeds[0]} --seeds {len(seeds)}{' --moving' * is_moving}"

@@ -32,10 +32,10 @@ _SETTLED_S = 0.3
 
 def guidance(seed: int = 0) -> ImageArray:
     """Return the mirrored guidance (H, W, 3) before each reference is captured, side by side."""
-    segments = {segment.name: segment for segment in reversed(timeline("all"))}
+    segments = {segment.name: segment for segment in reversed(timeline("bow"))}
     empty, shown = segments["empty"], []
     with tempfile.TemporaryDirectory() as folder:
-        synthesize_session(Path(folder) / "session", seed=seed)
+        synthesize_session(Path(folder) / "session", "bow", seed)
         with BagReader(Path(folder) / "session") as bag:
             span = TimeSpan(empty.start_s + _SETTLED_S, empty.end_s - _SETTLED_S)
             source = SilhouetteSource(bag, span)

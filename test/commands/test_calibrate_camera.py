@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 
 import cv2
@@ -31,6 +32,11 @@ def chessboard(columns: int, rows: int, square: int = 60) -> np.ndarray:
     return np.pad(
         np.kron(squares, np.ones((square, square), np.uint8)), square, constant_values=255
     )
+
+
+@cache
+def chessboard_seen(columns: int, rows: int) -> list[np.ndarray]:
+    return seen(chessboard(columns, rows))
 
 
 def seen(
@@ -88,7 +94,7 @@ def test_views_of_a_board_show_the_lens(name: str) -> None:
 def test_the_deviation_grows_where_views_are_few_and_noisy() -> None:
     rng = np.random.default_rng(0)
     board = Board.parse("9x6")
-    views, _ = board_views(board, seen(chessboard(9, 6)))
+    views, _ = board_views(board, chessboard_seen(9, 6))
     noisy = [
         view._replace(px=(view.px + rng.normal(0.0, 1.0, view.px.shape)).astype(np.float32))
         for view in views
@@ -133,7 +139,7 @@ def test_too_few_views_and_views_that_are_alike_are_refused(
 
 
 def test_other_numbers_of_corners_are_named() -> None:
-    images = seen(chessboard(9, 6), VIEWS[:2])
+    images = chessboard_seen(9, 6)[:2]
     assert board_views(Board.parse("8x5"), images) == ([], 0)
     assert "9x6" in Board.parse("8x5").other(images)
     assert Board.parse("8x5").other([np.zeros((480, 640), np.uint8)]) == ""
@@ -150,7 +156,7 @@ def film(tmp_path: Path) -> Path:
     """Return a folder of images of a board."""
     folder = tmp_path / "film"
     folder.mkdir()
-    for number, image in enumerate(seen(chessboard(7, 5))):
+    for number, image in enumerate(chessboard_seen(7, 5)):
         cv2.imwrite(str(folder / f"{number:03}.png"), image)
     return folder
 

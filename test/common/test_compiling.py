@@ -295,13 +295,18 @@ def test_other_packages_keep_their_folder() -> None:
     assert before == numba.config.CACHE_DIR
 
 
-@pytest.mark.parametrize("command", ["urdf", "synthesize", "call"])
-def test_what_needs_no_compiled_code_does_not_load_the_compiler(command: str) -> None:
+@pytest.mark.parametrize(
+    ("command", "library"),
+    [("urdf", "numba"), ("synthesize", "numba"), ("call", "numba"), ("track", "scipy.optimize")],
+)
+def test_libraries_that_take_long_and_are_not_needed_are_not_loaded(
+    command: str, library: str
+) -> None:
     code = (
         "import sys\nfrom cardbox_tracker.commands.main import main\n"
         f"try: main([{command!r}, '--help'])\nexcept SystemExit: pass\n"
         "import cardbox_tracker.person.urdf, cardbox_tracker.person.model_file\n"
-        "assert 'numba' not in sys.modules"
+        f"assert {library!r} not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
 

@@ -25,6 +25,7 @@ from cardbox_tracker.recordings import measured_scene
 from cardbox_tracker.recordings.given_camera import GivenCamera
 from cardbox_tracker.recordings.measured_scene import Watched, turns_in, watch
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
+from cardbox_tracker.recordings.turned_back import Turned
 from cardbox_tracker.search.config import TrackerConfig
 
 CAMERA = Camera(320, 240, 280.0, 280.0, 159.5, 119.5)
@@ -95,9 +96,9 @@ def write_film(folder: Path, moves: bool) -> Path:
     return folder
 
 
-@pytest.fixture
-def shaken(tmp_path: Path) -> Path:
-    return write_film(tmp_path / "shaken", moves=True)
+@pytest.fixture(scope="module")
+def shaken(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_film(tmp_path_factory.mktemp("films") / "shaken", moves=True)
 
 
 def request(folder: Path) -> RecordingRequest:
@@ -106,12 +107,17 @@ def request(folder: Path) -> RecordingRequest:
     return RecordingRequest(folder, finds, points=finds, camera=camera)
 
 
-def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path) -> None:
-    asked = request(shaken)
-    with asked.open() as source:
+@pytest.fixture(scope="module")
+def turned(shaken: Path) -> Turned:
+    """How the images are turned back."""
+    with request(shaken).open() as source:
         found = turns_in(source, watch(source))
     assert found is not None
-    turned = found[0]
+    return found[0]
+
+
+def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path, turned: Turned) -> None:
+    asked = request(shaken)
     assert turned.found.unknown == 0 and "turns by up to" in turned.remark
     with asked.turned_back(turned).open() as source:
         camera, frames = source.first.camera, [taken.first for taken in source.frames()]
@@ -127,10 +133,7 @@ def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path) -> No
         assert 0 < np.count_nonzero(frame.covered) < 0.3 * frame.covered.size
 
 
-def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path) -> None:
-    with request(shaken).open() as source:
-        found = turns_in(source, watch(source))
-    assert found is not None
+def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path, turned: Turned) -> None:
     images: list[NDArray[np.uint8]] = []
 
     class Looks(FindsDots):
@@ -139,7 +142,7 @@ def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path) -> None:
             return super().detect(image)
 
     finds = Detector(OwnModel.of(Looks, "Looks"))
-    asked = replace(request(shaken), silhouettes=finds, points=finds).turned_back(found[0])
+    asked = replace(request(shaken), silhouettes=finds, points=finds).turned_back(turned)
     with asked.open() as source:
         masks = [taken.first.silhouette.shape for taken in source.frames()]
         assert {*masks} == {(source.first.camera.height, source.first.camera.width)}
@@ -150,14 +153,9 @@ def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path) -> None:
         assert np.median(apart) < 6.0, number
 
 
-def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(shaken: Path) -> None:
-    with request(shaken).open() as source:
-        found = turns_in(source, watch(source))
-    assert found is not None
-    turned = found[0].placed(PersonChoice("place", (160.0, 120.0)))
-    assert np.array(turned.place) + found[0].found.corner_px == pytest.approx(
-        (160.0, 120.0), abs=1.0
-    )
+def test_who_is_at_a_place_of_the_first_image_is_there_in_turned_ones(turned: Turned) -> None:
+    placed = turned.placed(PersonChoice("place", (160.0, 120.0)))
+    assert np.array(placed.place) + turned.found.corner_px == pytest.approx((160, 120), abs=1.0)
 
 
 def test_the_place_is_of_the_first_image_also_if_turned_images_are_read_again(
@@ -178,8 +176,8 @@ def test_the_place_is_of_the_first_image_also_if_turned_images_are_read_again(
     person = PersonRequest(BodyModel(), None, 0.0, is_pitch_given=True, choice=choice)
     with scene.measured_scene(asked, person, TrackerConfig(), 0) as (_, _, chosen):
         assert chosen is not None
-    as_recorded, turned, again = choices
-    assert as_recorded == choice != turned == again
+    as_recorded, as_turned, again = choices
+    assert as_recorded == choice != as_turned == again
 
 
 def test_the_turns_show_a_field_of_view_that_is_not_given(

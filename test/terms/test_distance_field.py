@@ -13,7 +13,6 @@ from cardbox_tracker.terms.distance_field import (
     padded_width,
     signed_distances_of,
 )
-from cardbox_tracker.terms.outline_distances import FAR_PX
 
 
 def padded(mask: NDArray[np.uint8]) -> NDArray[np.float32]:
@@ -33,7 +32,7 @@ def by_definition(mask: NDArray[np.uint8]) -> NDArray[np.float64]:
     for y, x in np.ndindex(*mask.shape):
         others = mask != mask[y, x]
         nearest = np.hypot(v[others] - y, u[others] - x).min() if others.any() else np.inf
-        found[y, x] = min(nearest, FAR_PX) * (-1.0 if mask[y, x] else 1.0)
+        found[y, x] = min(nearest, FAR) * (-1.0 if mask[y, x] else 1.0)
     return found
 
 
@@ -50,7 +49,7 @@ def test_a_single_pixel() -> None:
 @pytest.mark.parametrize("value", [0, 1])
 def test_where_all_is_one_side_it_is_far_away(value: int) -> None:
     mask = np.full((4, 30), value, np.uint8)
-    assert np.all(distances(mask) == (-FAR_PX if value else FAR_PX))
+    assert np.all(distances(mask) == (-FAR if value else FAR))
 
 
 @settings(max_examples=60, deadline=None)
@@ -72,7 +71,7 @@ def test_beside_the_mask_its_outermost_columns_continue() -> None:
     assert found.shape[1] >= 3 + 2 * FAR
     # 3 px to the left of the foreground, and so on up to the limit.
     assert found[3, FAR - 1] == pytest.approx(3.0)
-    assert found[3, 0] == pytest.approx(FAR_PX)
+    assert found[3, 0] == pytest.approx(FAR)
     # To its right the foreground continues, whose nearest background is above.
     np.testing.assert_allclose(found[:, FAR + 4], [1.0, -1.0, -2.0, -3.0])
     np.testing.assert_allclose(found[:, -1], [1.0, -1.0, -2.0, -3.0])

@@ -151,7 +151,7 @@ def test_two_processes_keep_each_kernel_of_the_list(tmp_path: Path) -> None:
     every = json.loads(FILM_KERNELS.read_text())
     few = {
         name: every[name]
-        for name in ("search.approach", "terms.arm_points", "common.least_squares")
+        for name in ("search.mirroring", "terms.arm_points", "common.least_squares")
     }
     (tmp_path / "few.json").write_text(json.dumps(few))
     values = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
