@@ -87,8 +87,10 @@ def images():
         time.sleep(0.1)
     os.kill(os.getpid(), signal.SIGINT)
 
-hangs = types.SimpleNamespace(Arguments=Options, run=lambda _: [*results_ahead(time.sleep, images())])
-sys.modules["cardbox_tracker.commands.body"] = hangs
+def run(_):
+    return [*results_ahead(time.sleep, images())]
+
+sys.modules["cardbox_tracker.commands.body"] = types.SimpleNamespace(Arguments=Options, run=run)
 sys.argv = ["cardbox", "body"]
 runpy.run_module("cardbox_tracker.commands.main", run_name="__main__")
 """
