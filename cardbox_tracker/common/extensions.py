@@ -90,11 +90,11 @@ def _confined() -> Iterator[None]:
             os.close(folder)
 
 
-def _exit(code: int) -> NoReturn:
+def _exit(status: int) -> NoReturn:
     """End this process in place of ``os._exit``, but from foreign code raise SystemExit."""
     if _thread.foreign_in == os.getpid():
-        raise SystemExit(code)
-    end_process(code)
+        raise SystemExit(status)
+    end_process(status)
 
 
 os._exit = _exit

@@ -93,7 +93,7 @@ def _concordance(here: FloatArray, there: FloatArray, most: int) -> float | None
     found = list[float]()
     for lag in range(-most, most + 1):
         one, two, count = _moved(here, there, lag)
-        power = float(np.sum(one**2)), float(np.sum(two**2))
+        power = [float(np.sum(series**2)) for series in (one, two)]
         if count >= _FEWEST and max(power) > count * _MOTION_RAD**2:
             found.append(2.0 * float(np.sum(one * two)) / sum(power))
     return max(found, default=None)
@@ -101,8 +101,8 @@ def _concordance(here: FloatArray, there: FloatArray, most: int) -> float | None
 
 def _correlation(here: FloatArray, there: FloatArray, lag: int) -> float:
     one, two, count = _moved(here, there, lag)
-    power = np.linalg.norm(one) * np.linalg.norm(two)
-    return float(np.sum(one * two) / max(power, 1e-12)) if count >= _FEWEST else -1.0
+    power = float(np.linalg.norm(one) * np.linalg.norm(two))
+    return float(np.sum(one * two)) / max(power, 1e-12) if count >= _FEWEST else -1.0
 
 
 def _moved(here: FloatArray, there: FloatArray, lag: int) -> tuple[FloatArray, FloatArray, int]:
@@ -115,4 +115,4 @@ def _moved(here: FloatArray, there: FloatArray, lag: int) -> tuple[FloatArray, F
         of = np.where(known, series, 0.0)
         of -= known * (of.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
         moved.append(of)
-    return moved[0], moved[1], np.count_nonzero(known)
+    return moved[0], moved[1], int(np.count_nonzero(known))

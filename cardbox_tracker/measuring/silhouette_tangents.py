@@ -256,7 +256,8 @@ class PoseDirection:
     def is_suspected(self) -> bool:
         """Whether too few samples for a verdict show any of the errors."""
         supposed = (one for one, *_ in self._supposed)
-        return any(one.is_suspected for one in (self.height, self.joints, self.lag, *supposed))
+        verdicts = (self.height, self.joints, *supposed)
+        return self.lag.is_suspected or any(one.is_suspected for one in verdicts)
 
     def see(
         self,

@@ -152,7 +152,8 @@ class Tracker:
         is_moved = (pose, body.placement) != (before.camera_pose, before.placement)
         if is_moved:
             self.camera = self.camera.with_pitch(pose.pitch_rad)
-            self.place = PlaceWatch(self.body, self.camera)
+            is_same = pose == before.camera_pose and not is_new_start
+            self.place = PlaceWatch(self.body, self.camera, self.place if is_same else None)
             if self._before is not None:
                 self._before = moved(self._before[None])[0]
         self._silhouette = CompiledSilhouette(self.body, self.camera)
