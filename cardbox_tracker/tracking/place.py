@@ -132,8 +132,9 @@ class PlaceWatch:
         self._ious, self._fitted_m = deque[float](maxlen=_LATEST), np.nan
         self.contradiction, self.is_too_large, self.scale = "", False, 1.0
         if earlier is not None:
-            # Neither source depends on the version, and moments at which points err are few.
+            # Neither source depends on the version, and some posture misleads the points later.
             self._compared, self._apart_m = earlier._compared, earlier._apart_m
+            self._first_ns = earlier._first_ns
             self.contradiction, self.scale = earlier.contradiction, earlier.scale
             self.is_too_large = earlier.is_too_large
 
