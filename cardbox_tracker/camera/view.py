@@ -21,6 +21,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.common.errors import BodyModelError, CameraError
+from cardbox_tracker.common.settings import of_kind
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X, TORSO_Y, TORSO_Z, YAW
 from cardbox_tracker.person.sizes import FloatArray
@@ -40,6 +41,14 @@ class OtherCamera:
 
     camera: Camera  #: at the working resolution, without its pitch
     extrinsics: Extrinsics  #: its pose relative to the first camera
+
+    def __post_init__(self) -> None:
+        """Check the values; ValueError, or CameraError for a pose that is none."""
+        of_kind("camera", self.camera, Camera)
+        pose = of_kind("extrinsics", self.extrinsics, Extrinsics)
+        parts = pose.rotation, pose.translation_m
+        is_shaped = [*map(np.shape, parts)] == [(3, 3), (3,)]
+        Extrinsics.of(np.column_stack(parts) if is_shaped else parts, "the pose of another camera")
 
 
 @dataclass(frozen=True, eq=False)

@@ -214,4 +214,8 @@ class _Formatter(argparse.RawDescriptionHelpFormatter):
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    exit_code = main()
+    if interrupts.received():
+        # Python would wait for a thread in which foreign code hangs.
+        interrupts.leave(exit_code)
+    sys.exit(exit_code)

@@ -2,16 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Container
+import os
+import threading
+from collections.abc import Callable, Container, Iterator
+from contextlib import contextmanager
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points
-from typing import Any, TypeVar
+from typing import Any, NoReturn, TypeVar
 
 from cardbox_tracker.common.errors import CardboxError, cut
+from cardbox_tracker.common.interrupts import end_process
 
 R = TypeVar("R")
 
 DETECTORS, EXPORTERS = "detectors", "exporters"
+
+_lock = threading.Lock()
+# The working directory, open once for each call of foreign code that runs.
+_folders: list[int] = []
+
+
+class _Thread(threading.local):
+    """What a thread does; its copy in another process does something else."""
+
+    foreign_in = 0  #: process in which it runs foreign code
+
+
+_thread = _Thread()
 
 
 def extensions(kind: str, taken: Container[str]) -> dict[str, EntryPoint]:
@@ -40,10 +57,11 @@ def loaded(entry: EntryPoint) -> Any:
 def called(call: Callable[[], R], what: str, expected: str = "") -> R:
     """Return what foreign code returns; if it fails, raise CardboxError that begins with ``what``.
 
-    It may end with anything, such as what ends a program.
+    It may end with anything, such as what ends a program, and elsewhere among the folders.
     """
     try:
-        return call()
+        with _confined():
+            return call()
     except (CardboxError, KeyboardInterrupt):
         raise
     except BaseException as error:
@@ -52,6 +70,34 @@ def called(call: Callable[[], R], what: str, expected: str = "") -> R:
         except Exception:
             why = "its text is unknown"
         raise CardboxError(f"{what}: {type(error).__name__}: {why}{expected}") from error
+
+
+@contextmanager
+def _confined() -> Iterator[None]:
+    """Context of foreign code that neither ends this process nor moves its working directory."""
+    before = _thread.foreign_in
+    with _lock:
+        # Another call may already have moved it.
+        _folders.append(os.dup(_folders[0]) if _folders else os.open(".", os.O_RDONLY))
+    _thread.foreign_in = os.getpid()
+    try:
+        yield
+    finally:
+        _thread.foreign_in = before
+        with _lock:
+            folder = _folders.pop()
+            os.fchdir(folder)
+            os.close(folder)
+
+
+def _exit(status: int) -> NoReturn:
+    """End this process in place of ``os._exit``, but from foreign code raise SystemExit."""
+    if _thread.foreign_in == os.getpid():
+        raise SystemExit(status)
+    end_process(status)
+
+
+os._exit = _exit
 
 
 def place_of(entry: EntryPoint) -> str:

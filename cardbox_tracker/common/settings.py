@@ -151,9 +151,16 @@ def of_kind(name: str, value: Any, kind: type[T]) -> T:
     return value
 
 
-def settings_or(default: T, given: T | None) -> T:
+def all_of_kind(name: str, values: Iterable[Any], kind: type[T]) -> tuple[T, ...]:
+    """Return values that are all of a class; ValueError, which names them, if they are not."""
+    if not isinstance(values, Iterable):
+        raise ValueError(f"{name} are {quoted(values)}; expected a list of {kind.__name__}")
+    return tuple(of_kind(f"{name}[{number}]", one, kind) for number, one in enumerate(values))
+
+
+def settings_or(default: T, given: T | None, name: str = "config") -> T:
     """Return settings that are given, or the default ones; ValueError if they are of no such."""
-    return default if given is None else of_kind("config", given, type(default))
+    return default if given is None else of_kind(name, given, type(default))
 
 
 class Settings:

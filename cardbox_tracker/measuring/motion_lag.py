@@ -2,7 +2,9 @@
 
 Heights about the baseline of two cameras, of joints or of the top of a silhouette, are the same in
 both images at one time, whatever the person does. Where images of different moments are paired,
-they agree best after a shift in time.
+they agree best after a shift in time. Those of different people, or of times that are far apart, do
+not agree after any: the largest concordance (Lin, "A concordance correlation coefficient to
+evaluate reproducibility", 1989) is small.
 """
 
 from __future__ import annotations
@@ -11,7 +13,7 @@ from collections import deque
 
 import numpy as np
 
-from cardbox_tracker.common.health import Verdict
+from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.person.sizes import FloatArray
 
 # Time whose motion is compared, between two comparisons, and the largest lag that is looked for.
@@ -19,25 +21,32 @@ _WINDOW_NS, _EVERY_NS, _MOST_NS = 2_000_000_000, 200_000_000, 500_000_000
 # Least correlation at a lag, and how much larger it is than without; fewest pairs of heights.
 # Slow motions correlate at any lag.
 _LEAST, _MORE, _FEWEST = 0.9, 0.1, 10
+# Deviation of the heights of joints that is motion, rad; time after which it is first compared.
+_MOTION_RAD, _SHORTEST_NS = np.radians(1.0), 600_000_000
 
 
 class MotionLag:
-    """Compares the motion in two cameras' images of the last seconds; ``verdict`` has the lag, s.
+    """Compares the motion in two cameras' images of the last seconds.
 
-    The median lag is positive if the second camera is late. A lag of one image is none, since
-    cameras that are not synchronized are paired within an image.
+    Attributes:
+        verdict: the lag, s. Its median is positive if the second camera is late. A lag of one image
+            is none, since cameras that are not synchronized are paired within an image.
+        concordance: the largest one of joints that move.
+        is_suspected: whether that is too small in the first images, which are too few to tell it.
     """
 
     def __init__(self) -> None:
         """Begin without images."""
-        self.verdict = Verdict("late", abs)
+        self.verdict, self.concordance = Verdict("late", abs), Verdict("other motion")
+        self.is_suspected = False
         self._seen = deque[tuple[int, FloatArray, FloatArray]]()
         self._due_ns = 0
 
     def add(self, stamp_ns: int, here: FloatArray, there: FloatArray) -> None:
         """Add heights (n,) in both cameras' images of one time, in the same order; nan if unknown.
 
-        Times that go back begin anew.
+        The last one is that of the top, the others are those of joints. Times that go back begin
+        anew.
         """
         seen = self._seen
         if seen and stamp_ns <= seen[-1][0]:
@@ -46,12 +55,22 @@ class MotionLag:
         seen.append((stamp_ns, here, there))
         while (span_ns := stamp_ns - seen[0][0]) > _WINDOW_NS:
             seen.popleft()
-        if stamp_ns < self._due_ns or span_ns < 0.9 * _WINDOW_NS:
+        if stamp_ns < self._due_ns or span_ns < _SHORTEST_NS:
             return
         self._due_ns = stamp_ns + _EVERY_NS
-        _, first, other = zip(*seen, strict=True)
+        _, *both = zip(*seen, strict=True)
+        first, other = map(np.array, both)
         period_ns = span_ns / (len(seen) - 1)
-        lag = lag_of(np.array(first), np.array(other), round(_MOST_NS / period_ns))
+        most = round(min(_MOST_NS, span_ns / 4) / period_ns)
+        alike = _concordance(first[:, :-1], other[:, :-1], most)
+        is_whole = span_ns >= 0.9 * _WINDOW_NS
+        is_other = alike is not None and WATCHES["other motion"].is_beyond(alike)
+        self.is_suspected = is_other and not is_whole
+        if not is_whole:
+            return
+        if alike is not None:
+            self.concordance.see(alike)
+        lag = lag_of(first, other, most)
         if lag is not None:
             self.verdict.see(lag * period_ns / 1e9 if abs(lag) > 1 else 0.0)
 
@@ -69,16 +88,31 @@ def lag_of(here: FloatArray, there: FloatArray, most: int) -> int | None:
     return best if is_clear else None
 
 
+def _concordance(here: FloatArray, there: FloatArray, most: int) -> float | None:
+    """Return the largest concordance of two series (N, n); None if hardly anything moves."""
+    found = list[float]()
+    for lag in range(-most, most + 1):
+        one, two, count = _moved(here, there, lag)
+        power = [float(np.sum(series**2)) for series in (one, two)]
+        if count >= _FEWEST and max(power) > count * _MOTION_RAD**2:
+            found.append(2.0 * float(np.sum(one * two)) / sum(power))
+    return max(found, default=None)
+
+
 def _correlation(here: FloatArray, there: FloatArray, lag: int) -> float:
+    one, two, count = _moved(here, there, lag)
+    power = float(np.linalg.norm(one) * np.linalg.norm(two))
+    return float(np.sum(one * two)) / max(power, 1e-12) if count >= _FEWEST else -1.0
+
+
+def _moved(here: FloatArray, there: FloatArray, lag: int) -> tuple[FloatArray, FloatArray, int]:
+    """Return both series less their means, 0 where one is unknown, and how many are known."""
     end = len(here) - abs(lag)
     one, two = here[max(-lag, 0) :][:end], there[max(lag, 0) :][:end]
     known = np.isfinite(one) & np.isfinite(two)
-    if np.count_nonzero(known) < _FEWEST:
-        return -1.0
     moved = []
     for series in (one, two):
         of = np.where(known, series, 0.0)
         of -= known * (of.sum(axis=0) / np.maximum(known.sum(axis=0), 1))
         moved.append(of)
-    power = np.linalg.norm(moved[0]) * np.linalg.norm(moved[1])
-    return float(np.sum(moved[0] * moved[1]) / max(power, 1e-12))
+    return moved[0], moved[1], int(np.count_nonzero(known))

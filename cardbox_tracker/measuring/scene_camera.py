@@ -319,8 +319,9 @@ def background_shift(
 ) -> float | None:
     """Return how far most of the background has moved in an image, as a share of the longer side.
 
-    ``free`` (H, W) is not 0 where no people are in the image ``before``. None if too few points are
-    found again, or points of noise, which would hide a shift.
+    A turn about the optical axis moves it by the root mean square over the image. ``free`` (H, W)
+    is not 0 where no people are in the image ``before``. None if too few points are found again, or
+    points of noise, which would hide a shift.
     """
     # The type of its third point argument lacks None.
     flow: Any = cv2.calcOpticalFlowPyrLK
@@ -336,10 +337,19 @@ def background_shift(
     if same.sum() < _LEAST_POINTS:
         return None
     shifts = (there - corners)[same].reshape(-1, 2)
+    # Where a turn of 1 rad about the middle moves each point.
+    turns = (corners[same].reshape(-1, 2) - (width / 2, height / 2)) @ [(0.0, 1.0), (-1.0, 0.0)]
+    moved, across = (each - np.median(each, axis=0) for each in (shifts, turns))
+    roll = np.median(np.sum(moved * across, axis=1) / np.maximum(np.sum(across**2, axis=1), 1.0))
+    still, rolled = (np.median(np.linalg.norm(moved - k * across, axis=1)) for k in (0.0, roll))
+    if rolled > 0.5 * still:
+        roll = 0.0
+    shifts = shifts - roll * turns
     shift = np.median(shifts, axis=0)
     # Points of noise move, too, but not together.
     spread = float(np.median(np.linalg.norm(shifts - shift, axis=1)))
-    length, side = float(np.linalg.norm(shift)), max(width, height)
+    roll_px = roll * math.hypot(width, height) / math.sqrt(12.0)
+    length, side = float(np.linalg.norm([*shift, roll_px])), max(width, height)
     if length > 2 * spread:
         return float(length / side)
     return 0.0 if 2 * spread <= _SHIFT * side else None

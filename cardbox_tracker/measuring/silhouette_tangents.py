@@ -211,6 +211,8 @@ _EVERY, _FIRST = 2, 6
 _BETTER, _REST = 0.4, 0.1
 # Fewest joints that both cameras show.
 _LEAST_POINTS = 4
+# Tops that differ otherwise than joints that agree, by so much, are not both the person's, degrees.
+_OTHER_TOP_DEG = 2.0
 
 
 class PoseDirection:
@@ -256,7 +258,8 @@ class PoseDirection:
     def is_suspected(self) -> bool:
         """Whether too few samples for a verdict show any of the errors."""
         supposed = (one for one, *_ in self._supposed)
-        return any(one.is_suspected for one in (self.height, self.joints, *supposed))
+        verdicts = (self.height, self.joints, *supposed)
+        return self.lag.is_suspected or any(one.is_suspected for one in verdicts)
 
     def see(
         self,
@@ -269,12 +272,18 @@ class PoseDirection:
 
         ``points`` are those of a detector in both images. Without a stamp, no lag is looked for.
         """
-        heights = self._see_joints(*points), self._see_silhouettes(first, other)
+        joints = self._see_joints(*points)
+        heights = joints, self._see_silhouettes(first, other, _lower_deg(joints))
         if stamp_ns is not None:
             self.lag.add(stamp_ns, *np.hstack(heights))
 
-    def _see_silhouettes(self, first: Silhouette, other: Silhouette) -> FloatArray:
-        """Return the height of the top in both cameras, (2, 1), rad; nan where it is unknown."""
+    def _see_silhouettes(
+        self, first: Silhouette, other: Silhouette, joints_deg: float | None
+    ) -> FloatArray:
+        """Return the height of the top in both cameras, (2, 1), rad; nan where it is unknown.
+
+        ``joints_deg`` is how much lower joints are in the other camera.
+        """
         tops = np.full((2, 1), np.nan)
         self._frames += 1
         if self._frames > _FIRST and self._frames % _EVERY:
@@ -289,10 +298,14 @@ class PoseDirection:
         for number, ((hull, *_), axes) in enumerate(zip(hulls, self._given[1:], strict=True)):
             ray, is_whole = _highest(hull, axes)
             tops[number] = np.arctan2(*(axes @ ray)) if is_whole else np.nan
-        given = abs(np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given)))
+        lower_deg = np.degrees(_height_of(hulls[0][0], hulls[1][0], self._given))
+        given = abs(lower_deg)
         if np.isfinite(given):
             self._wrong.see(given)
-            self.height.see(given)
+            # A mask may have a thing above the head; then the joints agree.
+            is_agreed = joints_deg is not None and not self.joints.watch.is_beyond(abs(joints_deg))
+            if not is_agreed or abs(lower_deg - joints_deg) < _OTHER_TOP_DEG:
+                self.height.see(given)
         for verdict, pencil, here, there in self._supposed:
             supposed = abs(np.degrees(_height_of(hulls[0][here], hulls[1][there], pencil)))
             if np.isfinite(given) or np.isfinite(supposed):
@@ -322,11 +335,15 @@ class PoseDirection:
         return angles
 
 
-def _apart_deg(angles: FloatArray) -> float | None:
-    apart = np.abs(angles[0] - angles[1])
-    known = np.isfinite(apart)
+def _lower_deg(angles: FloatArray) -> float | None:
+    lower = angles[0] - angles[1]
+    known = np.isfinite(lower)
     is_enough = np.count_nonzero(known) >= _LEAST_POINTS
-    return float(np.degrees(np.median(apart[known]))) if is_enough else None
+    return float(np.degrees(np.median(lower[known]))) if is_enough else None
+
+
+def _apart_deg(angles: FloatArray) -> float | None:
+    return _lower_deg(np.array([np.abs(angles[0] - angles[1]), np.zeros(angles.shape[1])]))
 
 
 def _explained(given: float, supposed: float) -> float:

@@ -72,7 +72,8 @@ class _Compared:
     @property
     def fault(self) -> Verdict | None:
         """A gross error, so that images are not used; None without one."""
-        return self.direction.fault or (self.aside if self.aside.holds else None)
+        others = self.aside, self.direction.lag.concordance
+        return self.direction.fault or next((one for one in others if one.holds), None)
 
     @property
     def is_suspected(self) -> bool:

@@ -116,8 +116,11 @@ class PlaceWatch:
         scale: how much larger than the body the second source shows the person, if they differ.
     """
 
-    def __init__(self, body: BodyModel, camera: Camera) -> None:
-        """Begin with the first camera and the person before unknown values are fitted."""
+    def __init__(self, body: BodyModel, camera: Camera, earlier: PlaceWatch | None = None) -> None:
+        """Begin with the first camera and the person before unknown values are fitted.
+
+        ``earlier`` compared the sources of another version of the body before the same camera.
+        """
         self._body, self._camera = body, camera
         self._scale = MEASURED_BODY if body.source == MEASURED else STATURE
         is_found = body.is_distance_found or "distance_m" in body.unknown
@@ -128,6 +131,12 @@ class PlaceWatch:
         self._apart_m = 0.0
         self._ious, self._fitted_m = deque[float](maxlen=_LATEST), np.nan
         self.contradiction, self.is_too_large, self.scale = "", False, 1.0
+        if earlier is not None:
+            # Neither source depends on the version, and some posture misleads the points later.
+            self._compared, self._apart_m = earlier._compared, earlier._apart_m
+            self._first_ns = earlier._first_ns
+            self.contradiction, self.scale = earlier.contradiction, earlier.scale
+            self.is_too_large = earlier.is_too_large
 
     def placed(self, estimate: Estimate, body: BodyModel, frames: Sequence[Frame]) -> Estimate:
         """Return an estimate with its place, which no deviation of it is surer than."""

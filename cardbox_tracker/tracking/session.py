@@ -29,7 +29,7 @@ from cardbox_tracker.camera.extrinsics import meeting_m
 from cardbox_tracker.camera.tilt import tilted_body, tilted_states
 from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.common.health import Verdict
-from cardbox_tracker.common.settings import settings_or
+from cardbox_tracker.common.settings import all_of_kind, of_kind, settings_or
 from cardbox_tracker.detectors.figure import Figure, figure_of_points
 from cardbox_tracker.detectors.identity import (
     ALIKE,
@@ -217,11 +217,22 @@ class Session:
         ``scene`` finds the camera and people's distances meanwhile, and bodies follow it. ``only``
         is the number of the one person whose estimate is given; the others are only told apart. The
         other arguments are those of :class:`~.tracker.Tracker`.
+
+        Raises what a tracker does, and ValueError if there is no body, or another number of people.
         """
-        self._bodies = tuple(_before_all(body, others) for body in bodies)
-        self._camera = camera
+        known, others = (
+            all_of_kind("bodies", bodies, BodyModel),
+            all_of_kind("others", others, OtherCamera),
+        )
+        if not known:
+            raise ValueError("bodies are empty; expected the body of each person, or one for all")
+        for name, number in (("people", people), ("only", only)):
+            if number is not None and not 0 <= of_kind(name, number, int) <= MOST_PEOPLE:
+                raise ValueError(f"{name} is {number}; expected a number up to {MOST_PEOPLE}")
+        self._bodies = tuple(_before_all(body, others) for body in known)
+        self._camera = of_kind("camera", camera, Camera)
         self.config = settings_or(default_preset(), config)
-        self._rng, self._others = rng or np.random.default_rng(0), tuple(others)
+        self._rng, self._others = settings_or(np.random.default_rng(0), rng, "rng"), others
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
         self._scene, self._only = scene, only
@@ -340,7 +351,7 @@ class Session:
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from now on; return whether tracking starts again, see Tracker."""
-        self.config = config
+        self.config = of_kind("config", config, TrackerConfig)
         restarted = [tracker.configure(config) for tracker in self.trackers]
         return any(restarted)
 

@@ -13,7 +13,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.tilt import tilted_states
 from cardbox_tracker.camera.view import OtherCamera, View
-from cardbox_tracker.common.settings import of_kind, restarts, settings_or
+from cardbox_tracker.common.settings import all_of_kind, of_kind, restarts, settings_or
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
@@ -96,7 +96,8 @@ class Tracker:
         body = of_kind("body", body, BodyModel)
         self.camera = of_kind("camera", camera, Camera).with_pitch(body.camera_pose.pitch_rad)
         self.config = settings_or(TrackerConfig(), config)
-        self._rng = rng or np.random.default_rng(0)
+        self._rng = settings_or(np.random.default_rng(0), rng, "rng")
+        others = all_of_kind("others", others, OtherCamera)
         self._make_filter, self._look, self._is_alone = make_filter, look, not others
         if others and (make_filter or not self.config.has_several_views):
             raise ValueError("several cameras need the filter whole_body: the preset default")
@@ -152,7 +153,8 @@ class Tracker:
         is_moved = (pose, body.placement) != (before.camera_pose, before.placement)
         if is_moved:
             self.camera = self.camera.with_pitch(pose.pitch_rad)
-            self.place = PlaceWatch(self.body, self.camera)
+            is_same = pose == before.camera_pose and not is_new_start
+            self.place = PlaceWatch(self.body, self.camera, self.place if is_same else None)
             if self._before is not None:
                 self._before = moved(self._before[None])[0]
         self._silhouette = CompiledSilhouette(self.body, self.camera)
@@ -169,7 +171,7 @@ class Tracker:
 
     def configure(self, config: TrackerConfig) -> bool:
         """Use other settings from the next frame on; return whether tracking starts again."""
-        is_new_start = restarts(self.config, config)
+        is_new_start = restarts(self.config, of_kind("config", config, TrackerConfig))
         if config.terms != self.config.terms:
             for camera in self.cameras:
                 camera.configure(config)

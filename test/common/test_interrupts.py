@@ -75,6 +75,34 @@ def test_an_interrupted_command_has_its_exit_code_wherever_the_interrupt_came(
     assert (done.returncode, done.stdout, done.stderr) == (130, "interrupted\n", "")
 
 
+# A call in another thread never ends, as that of a detector may.
+HANGING = """
+import os, runpy, signal, sys, time, types
+from cardbox_tracker.commands.arguments import Options
+from cardbox_tracker.common.beside import results_ahead
+
+def images():
+    for _ in range(2):
+        yield 1e6
+        time.sleep(0.1)
+    os.kill(os.getpid(), signal.SIGINT)
+
+def run(_):
+    return [*results_ahead(time.sleep, images())]
+
+sys.modules["cardbox_tracker.commands.body"] = types.SimpleNamespace(Arguments=Options, run=run)
+sys.argv = ["cardbox", "body"]
+runpy.run_module("cardbox_tracker.commands.main", run_name="__main__")
+"""
+
+
+def test_an_interrupted_module_waits_for_no_foreign_code() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", HANGING], capture_output=True, text=True, check=False, timeout=100
+    )
+    assert (done.returncode, done.stderr) == (130, "cardbox body: interrupted\n")
+
+
 def test_an_ignored_signal_stays_ignored() -> None:
     program = (
         "import os, signal; from cardbox_tracker.common import interrupts\n"

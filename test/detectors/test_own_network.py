@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from itertools import repeat
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -135,6 +138,39 @@ def test_numbers_that_cannot_be_read_are_named() -> None:
 
     with pytest.raises(CardboxError, match=r"Scripted.detect, person 0: on the GPU"):
         detector([{"nose": (Elsewhere(), 1, 1)}]).start()(IMAGE, 0)
+
+
+def test_a_detector_ends_no_process_but_its_own() -> None:
+    class Ends(Scripted):
+        def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+            if (copy := os.fork()) == 0:
+                os._exit(4)
+            os._exit(os.waitstatus_to_exitcode(os.waitpid(copy, 0)[1]))
+
+    with pytest.raises(CardboxError, match=r"Ends.detect fails: SystemExit: 4"):
+        Detector(OwnModel.of(Ends(), "it")).start()(IMAGE, 0)
+
+
+def test_a_detector_that_changes_the_folder_moves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "model").mkdir()
+
+    class Wanders(Scripted):
+        def __init__(self) -> None:
+            super().__init__([person(40)])
+            os.chdir(tmp_path / "model")
+
+        def detect(self, image: np.ndarray) -> Sequence[Mapping[str, Any]]:
+            os.chdir(tmp_path / "model")
+            # That of a second camera, in another thread.
+            with ThreadPoolExecutor() as pool:
+                pool.submit(Detector(OwnModel.of(Wanders, "it")).start).result()
+            return super().detect(image)
+
+    Detector(OwnModel.of(Wanders, "it")).start()(IMAGE, 0)
+    assert Path.cwd() == tmp_path
 
 
 def test_a_detector_that_draws_leaves_the_image() -> None:

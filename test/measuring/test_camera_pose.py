@@ -369,28 +369,42 @@ def test_the_first_image_of_a_wrong_pose_is_doubted_before_anything_is_told(
     assert asked.remarks(["cam1"]) == []
 
 
+def joints_in_both() -> tuple[ImagePoints, ImagePoints]:
+    """Joints of somebody two metres away, from 0.6 m below the camera to 0.3 m above it."""
+    places = np.random.default_rng(0).uniform((-0.4, -0.3, 1.8), (0.4, 0.6, 2.2), (17, 3))
+    there = places @ TRUE.rotation.T + TRUE.translation_m
+    seen = ((CAMERA, places), (OTHER, there))
+    first, other = (ImagePoints(camera.project(at), np.ones(17)) for camera, at in seen)
+    return first, other
+
+
+@pytest.mark.parametrize("turned_deg", [0.0, -2.0])
+def test_a_thing_above_the_head_in_a_mask_is_no_wrong_pose_if_joints_agree(
+    turned_deg: float,
+) -> None:
+    wrong = moved_by(TRUE, np.radians([turned_deg, *[0.0] * 5]))
+    alone, found = (PoseDirection(CAMERA, OTHER, wrong, 0.0) for _ in range(2))
+    for frame in sightings(waving(12)):
+        # The hat is 2.2 degrees high.
+        hat = cv2.dilate(frame.other, np.ones((13, 1), np.uint8), anchor=(0, 0))
+        alone.see(frame.first, hat)
+        found.see(frame.first, hat, joints_in_both())
+    assert alone.height.holds and found.height.holds == (turned_deg != 0.0)
+
+
 @pytest.mark.parametrize(
     ("turned_deg", "zoom", "height_deg"), [(0.0, 1.0, 0.0), (2.0, 1.0, 2.3), (0.0, 1.3, 2.3)]
 )
 def test_joints_in_both_images_tell_a_wrong_pose_or_focal_length(
     turned_deg: float, zoom: float, height_deg: float
 ) -> None:
-    """Joints of somebody two metres away, from 0.6 m below the camera to 0.3 m above it.
-
-    The planes through the baseline, at 60 degrees to the line of sight, turn by 2 / sin(60).
-    """
-    places = np.random.default_rng(0).uniform((-0.4, -0.3, 1.8), (0.4, 0.6, 2.2), (17, 3))
-    there = places @ TRUE.rotation.T + TRUE.translation_m
-    pair = [
-        ImagePoints(camera.project(seen), np.ones(17))
-        for camera, seen in ((CAMERA, places), (OTHER, there))
-    ]
+    """The planes through the baseline, at 60 degrees to the line of sight, turn by 2 / sin(60)."""
     wrong = moved_by(TRUE, np.radians([turned_deg, 0.0, 0.0, 0.0, 0.0, 0.0]))
     other = replace(OTHER, fx=zoom * OTHER.fx, fy=zoom * OTHER.fy)
     found, nobody = PoseDirection(CAMERA, other, wrong, 0.0), np.zeros((240, 320), np.uint8)
     for _ in range(6):
         assert not found.joints.holds
-        found.see(nobody, nobody, (pair[0], pair[1]))
+        found.see(nobody, nobody, joints_in_both())
     assert found.joints.value == pytest.approx(height_deg, abs=0.2)
     assert found.joints.holds == (height_deg > 0.0)
 

@@ -39,3 +39,18 @@ def test_a_lag_lasts_while_nobody_moves_and_ends_with_the_clock() -> None:
     assert "0.3 s later" in lag.remark("cam1")
     lag.add(0, MOVES[0], MOVES[0])
     assert len(lag._seen) == 1
+
+
+@pytest.mark.parametrize("speed", [0.01, 1.0])
+def test_other_motion_is_suspected_at_once_and_told_after_two_seconds(speed: float) -> None:
+    """Who hardly moves shows nothing, and nor does the top of the silhouette alone."""
+    lag, top, there = MotionLag(), MotionLag(), speed * np.cumsum(RNG.normal(0, 0.1, (60, 5)), 0)
+    suspected, told = list[bool](), list[bool]()
+    for i, (one, two) in enumerate(zip(speed * MOVES, there, strict=True)):
+        lag.add(i * 50_000_000, one, two)
+        joints = np.full(4, np.nan)
+        top.add(i * 50_000_000, np.append(joints, one[0]), np.append(joints, two[0]))
+        suspected.append(lag.is_suspected)
+        told.append(lag.concordance.holds)
+    assert not any(told[:36]) and told[44] == suspected[13] == (speed == 1.0)
+    assert not suspected[44] and not (top.is_suspected or top.concordance.samples)

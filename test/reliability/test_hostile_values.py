@@ -30,11 +30,14 @@ from cardbox_tracker.applications.retargeting.robot import load_robot, parse_rob
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
 from cardbox_tracker.camera.calibration_file import load_calibration
 from cardbox_tracker.camera.camera import Calibration, Camera
+from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.extrinsics_files import load_extrinsics
+from cardbox_tracker.camera.view import OtherCamera
 from cardbox_tracker.commands.arguments import add_options
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import nested, settings_below
+from cardbox_tracker.detectors.image_points import COCO_NAMES
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene
 from cardbox_tracker.person.model import CONSTANTS, BodyModel, body_from_proportions
@@ -55,12 +58,14 @@ from cardbox_tracker.segmentation.background_file import (
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.session import Session
 from lab.evaluation.results import read_json
 from lab.tools.reliability import refusals
 
 ROOT = Path(__file__).parents[2]
 SIZE = (32, 24)
 CAMERA = Calibration.of_fov(*SIZE, 60.0)
+ASIDE = Extrinsics(np.eye(3), np.array([-0.5, 0.0, 0.0]))
 PROMISE = "Any damaged or hostile input is read or refused with a reason"
 HOSTILE: tuple[Any, ...] = (
     *(None, True, "", "x" * 5000, "\x1b[2J", "a\nb", [], {}, -1, 0),
@@ -104,6 +109,10 @@ CAMCHAIN = {
     "left": {"T_cam_imu": np.eye(4).tolist()},
     "right": {"T_cn_cnm1": np.eye(4).tolist(), "rostopic": "/right/image_raw"},
 }
+PAIR = {
+    "R": {"rows": 3, "cols": 3, "dt": "d", "data": np.eye(3).ravel().tolist()},
+    "T": {"rows": 3, "cols": 1, "dt": "d", "data": [-0.5, 0.0, 0.0]},
+}
 KALIBR = {
     "cam0": {
         "camera_model": "pinhole",
@@ -119,7 +128,11 @@ PERSON = {"image_id": 1, "keypoints": [30.0, 20.0, 0.9] * 17, "score": 0.9}
 OPENPOSE = {"pose_keypoints_2d": [3.0, 2.0, 0.9] * 17, "hand_left_keypoints_2d": [1.0] * 63}
 POINTS: dict[str, Any] = {
     "results.json": [PERSON, {**PERSON, "image_id": "im_2.png"}],
-    "annotations.json": {"images": [{"id": 1, "file_name": "1.png"}], "annotations": [PERSON]},
+    "annotations.json": {
+        "categories": [{"id": 1, "keypoints": [*reversed(COCO_NAMES)]}],
+        "images": [{"id": 1, "file_name": "1.png"}],
+        "annotations": [{**PERSON, "category_id": 1}],
+    },
     "folder/f_1_keypoints.json": {"people": [OPENPOSE]},
 }
 CAMERA_GROUP = Path(__file__).with_name("camera_group.toml").read_text()
@@ -129,6 +142,7 @@ YAML_FILES: dict[str, tuple[Callable[[Path], Any], Any]] = {
     "settings": (lambda path: read_settings(path, TrackerConfig()), SETTINGS),
     "calibration": (load_calibration, CALIBRATION),
     "extrinsics": (lambda path: load_extrinsics(path, ["left", "right"]), CAMCHAIN),
+    "pair": (lambda path: load_extrinsics(path, ["left", "right"]), PAIR),
     "size of FileStorage": (load_calibration, {**CALIBRATION, "image_size": [64, 48]}),
     "Kalibr": (load_calibration, KALIBR),
     "scene": (load_scene, yaml.safe_load(dumps_scene(Scene(SceneCamera(*[KNOWN] * 3), ())))),
@@ -231,7 +245,7 @@ def film() -> bytes:
 def photo() -> bytes:
     """A small JPEG with a lens in its EXIF."""
     exif, file = Image.Exif(), io.BytesIO()
-    exif[0x0110] = "ILCE-7M3"
+    exif[0x0110], exif[0x0112] = "ILCE-7M3", 6
     exif.get_ifd(0x8769).update({0xA405: 28, 0x920A: 4.2, 0xA20E: 900.0, 0xA002: 32})
     Image.new("RGB", SIZE).save(file, "JPEG", exif=exif)
     return file.getvalue()
@@ -283,6 +297,8 @@ NUMBER = st.one_of(
             *(f"body {name}" for name in (*CONSTANTS, "version", "stature_stddev", "unknown")),
             *(f"settings {name}" for name, *_ in settings_below(default_preset())),
             *(f"request {one.name}" for one in fields(Request)),
+            *(f"session {name}" for name in ("bodies", "camera", "config", "rng", "others")),
+            *("session people", "session only", "pose rotation", "pose translation_m"),
             *("stamp", "field of view", "proportions"),
         ]
     ),
@@ -291,11 +307,14 @@ NUMBER = st.one_of(
 @example("field of view", 5e-324)
 def test_any_number_in_python(of: str, value: Any) -> None:
     kind, _, name = of.partition(" ")
+    camera = CAMERA.camera(*SIZE)
     make: dict[str, Callable[[], Any]] = {
-        "camera": lambda: replace(CAMERA.camera(*SIZE), **{name: value}),
+        "camera": lambda: replace(camera, **{name: value}),
         "body": lambda: BODY.with_values(**{name: value}),
         "settings": lambda: default_preset().changed(nested({name: value})),
         "request": lambda: Request(**{"recording": Path("none"), name: value}),
+        "session": lambda: Session(**{"bodies": [BODY], "camera": camera, name: value}),
+        "pose": lambda: OtherCamera(camera, replace(ASIDE, **{name: value})),
         "stamp": lambda: Observation(stamp_ns=value),
         "field": lambda: Calibration.of_fov(*SIZE, value),
         "proportions": lambda: body_from_proportions(value),

@@ -211,6 +211,22 @@ def test_a_stature_that_contradicts_depth_or_a_second_camera_is_told(depth: bool
         assert bool(watch.contradiction) is is_told
 
 
+def test_points_that_err_for_a_moment_contradict_no_later_version_of_a_body() -> None:
+    body = body_from_proportions(1.80)
+    watch = PlaceWatch(body, CAMERA)
+    for frame in (*frames(points_at(2.0), count=20), *frames(points_at(2.4), count=60)[20:]):
+        if frame.stamp_ns in (20 * 10**8, 40 * 10**8):
+            watch = PlaceWatch(body, CAMERA, watch)
+        watch.see(estimate_at(2.0, body), body, frame, is_alone=False)
+    assert watch.contradiction == ""
+    # A contradiction lasts, too.
+    child = body_from_proportions(1.35)
+    watch = PlaceWatch(child, CAMERA)
+    for frame in frames(points_at(2.0)):
+        watch.see(estimate_at(2.0, child), child, frame, is_alone=False)
+    assert PlaceWatch(child, CAMERA, watch).contradiction == watch.contradiction != ""
+
+
 def test_without_a_second_source_nothing_contradicts() -> None:
     child = body_from_proportions(1.35)
     watch = PlaceWatch(child, CAMERA)

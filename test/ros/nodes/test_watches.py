@@ -197,6 +197,16 @@ def late(measures: Sequence[float]) -> Told:
         yield "later" in lag.remark("cam1")
 
 
+def other_motion(measures: Sequence[float]) -> Told:
+    """Eight joints swing at 2 Hz; in the other images so much of that, and the rest at 6 Hz."""
+    lag = MotionLag()
+    for number, share in enumerate(measures):
+        for i in range(300 * number, 300 * (number + 1)):
+            here, rest = (np.sin(hertz * np.pi * i / 10 + np.arange(9)) for hertz in (2, 6))
+            lag.add(i * S // 20, here, share * here + np.sqrt(1.0 - share**2) * rest)
+        yield lag.concordance.holds
+
+
 def other_view(measures: Sequence[float]) -> Told:
     """A wall is behind the lower part of the person, who is 2 m away; else there is no jump."""
     depths, mask = DepthAgreement(), np.zeros((120, 160), np.uint8)
@@ -549,6 +559,7 @@ CASES = [
     Case("unit", 0.25, 0.35, of_extrinsics("unit"), lasting=0.2, ending=0.1),
     Case("aside", 0.4, 0.8, aside, ending=0.2),
     Case("late", 0.1, 0.2, late),
+    Case("other motion", 0.53, 0.47, other_motion, lasting=0.56, ending=0.64),
     Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
     Case("distance", 1.85, 2.05, distance, lasting=1.1, ending=0.9),
