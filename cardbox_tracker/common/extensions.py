@@ -79,6 +79,7 @@ def _confined() -> Iterator[None]:
     with _lock:
         # Another call may already have moved it.
         _folders.append(os.dup(_folders[0]) if _folders else os.open(".", os.O_RDONLY))
+        os._exit = _exit
     _thread.foreign_in = os.getpid()
     try:
         yield
@@ -88,6 +89,8 @@ def _confined() -> Iterator[None]:
             folder = _folders.pop()
             os.fchdir(folder)
             os.close(folder)
+            if not _folders:
+                os._exit = end_process
 
 
 def _exit(status: int) -> NoReturn:
@@ -95,9 +98,6 @@ def _exit(status: int) -> NoReturn:
     if _thread.foreign_in == os.getpid():
         raise SystemExit(status)
     end_process(status)
-
-
-os._exit = _exit
 
 
 def place_of(entry: EntryPoint) -> str:
