@@ -112,7 +112,10 @@ class Supervisor:
         command = self.tick(now_ns)
         clock_ns = self._clock_ns(now_ns)
         if self.phase is Phase.READY:
-            if clock_ns <= self._stopped_ns or not self._begins(now_ns):
+            # A robot that could not follow begins elsewhere than where it was sent to stop, so a
+            # moment without a command tells both apart.
+            is_stopped = clock_ns > self._stopped_ns + self._period_ns
+            if not is_stopped or not self._begins(now_ns):
                 return command
         elif self.phase not in _MOVING:
             return command

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from cardbox_tracker.applications.retargeting.config import RetargetConfig
@@ -77,7 +77,12 @@ EVENTS = (
 FARTHEST_RAD = 0.2 + 0.1 + 2 * STEP_NS / 1e9
 
 
+# One that could not move is enabled anew as soon as it has been stopped.
+STOPPED = [("grip", 1), ("tracking", 2), ("blocked", 1), ("step", 16), ("on", 1), ("tracking", 6)]
+
+
 @given(st.lists(st.tuples(st.sampled_from(EVENTS), st.integers(1, 30)), max_size=40))
+@example(STOPPED)
 def test_no_sequence_makes_it_jump_or_send_what_was_not_enabled(
     events: list[tuple[str, int]],
 ) -> None:
