@@ -14,7 +14,7 @@ from cardbox_tracker.person.posture import reference_posture, state_limits
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.search.approach import Approach, at_distances
 from cardbox_tracker.search.config import default_preset
-from cardbox_tracker.search.doubt import HANDS, STAYS_SURE, Source, models, remembered
+from cardbox_tracker.search.doubt import HANDS, Source, models
 from cardbox_tracker.search.visibility import is_trackable
 from cardbox_tracker.terms.multi_view import MultiViewCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
@@ -49,13 +49,10 @@ def test_a_person_who_walks_metres_is_followed(begin_m: float, end_m: float) -> 
     way = np.linspace(begin_m, end_m, steps).tolist()
     found = seen_at([begin_m] * 5 + way + [end_m] * 25, begin_m)
     assert distance_of(found[-1], begin_m) == pytest.approx(end_m, rel=0.06)
-    # Far away a keypoint may be in doubt, and the state follows the hands over time.
-    doubt = np.zeros(len(HANDS))
-    for one in found:
-        assert one.keypoint_chances is not None and one.keypoint_states is not None
-        doubt = remembered(doubt, one.keypoint_chances[HANDS])
-    limit = DOUBTFUL_ABOVE * (STAYS_SURE if found[-2].state == TRACKING else 1.0)
-    assert (found[-1].state == TRACKING) == bool(doubt.max() <= limit)
+    # Far away a keypoint may be in doubt, and the state follows the hands.
+    assert found[-1].keypoint_chances is not None and found[-1].keypoint_states is not None
+    is_sure = bool((found[-1].keypoint_chances[HANDS] <= DOUBTFUL_ABOVE).all())
+    assert (found[-1].state == TRACKING) == is_sure
     assert KeypointState.LOST not in found[-1].keypoint_states
 
 
