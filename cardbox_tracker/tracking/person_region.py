@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.array_checks import check_array
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.segmentation.regions import Regions, find_regions, paint
@@ -35,6 +35,8 @@ _CHANGE = 18
 # (10 s at 15 Hz).
 _KNOWN, _LONGEST = 8, 150
 
+BACKGROUND, PERSON, THING = 0, 1, 2
+"""Class of a pixel by the silhouette."""
 UNKNOWN, SAME, CHANGED = 0, 1, 2
 """Result of the comparison of a pixel with the object at rest."""
 
@@ -44,41 +46,79 @@ class StillThings:
 
     def __init__(self) -> None:
         """Begin without known objects."""
-        self.forget()
+        self._looks: ImageArray | None = None
+        self._counts = np.zeros((0, 0), np.int16)
 
     def forget(self) -> None:
         """Forget all objects."""
-        self._looks: ImageArray = np.zeros(0, np.uint8)
-        self._counts = np.zeros(0, np.uint8)
+        self._looks = None
 
     def compare(self, image: ImageArray) -> NDArray[np.uint8]:
         """Return ``UNKNOWN``, ``SAME`` or ``CHANGED`` for each pixel of an image (H, W[, 3])."""
-        if self._looks.shape != image.shape:
-            return np.full(image.shape[:2], UNKNOWN, np.uint8)
-        found = np.where(self._is_same(image), np.uint8(SAME), np.uint8(CHANGED))
-        found[self._counts < _KNOWN] = UNKNOWN
+        found = np.zeros(image.shape[:2], np.uint8)
+        planes = _planes(image)
+        if self._looks is not None and self._looks.shape == planes.shape:
+            _compare(planes, self._looks, self._counts, found)
         return found
 
-    def learn(self, image: ImageArray, is_thing: NDArray[np.bool_]) -> None:
-        """Update from an image, of which some pixels (H, W) show objects."""
-        if self._looks.shape != image.shape:
-            self._looks, self._counts = image.copy(), np.zeros(image.shape[:2], np.uint8)
-        looks, counts = self._looks, self._counts
-        is_same = is_thing & (counts > 0) & self._is_same(image)
-        # Others hide the object for a while.
-        is_covered = is_thing & ~is_same & (counts > _KNOWN)
-        is_new = is_thing & ~is_same & ~is_covered
-        # Slow changes of the light are followed.
-        now, before = image[is_same], looks[is_same]
-        looks[is_same] = before + (now > before) - (now < before)
-        looks[is_new] = image[is_new]
-        longer = np.minimum(counts, _LONGEST - 1) + 1
-        counts[:] = np.where(is_same, longer, np.where(is_covered, counts - 1, is_new))
+    def learn(self, image: ImageArray, shows: NDArray[np.uint8]) -> None:
+        """Update from an image, of which ``shows`` (H, W) has the class of each pixel."""
+        planes = _planes(image)
+        check_array("shows", shows, planes.shape[:2])
+        if self._looks is None or self._looks.shape != planes.shape:
+            self._looks = np.zeros_like(planes)
+            self._counts = np.zeros(planes.shape[:2], np.int16)
+        _learn(planes, shows, self._looks, self._counts)
 
-    def _is_same(self, image: ImageArray) -> NDArray[np.bool_]:
-        """Return in which pixels (H, W) all channels differ little from those of objects."""
-        change = cv2.absdiff(image, self._looks)
-        return np.asarray(cv2.inRange(change, (0.0,) * 4, (float(_CHANGE),) * 4) > 0)
+
+def _planes(image: ImageArray) -> ImageArray:
+    """Return an image (H, W) or (H, W, 3) as (H, W, channels), copied if it is read-only."""
+    # numba would compile another version for read-only arrays.
+    pixels = np.require(image, requirements=("C", "W"))
+    return pixels[..., None] if pixels.ndim == 2 else pixels
+
+
+@copied_kernel
+def _change(image: Any, looks: Any, v: Any, u: Any) -> Any:
+    """Return the largest difference over the channels of a pixel."""
+    largest: Any = 0
+    for k in range(looks.shape[2]):
+        largest = max(largest, abs(np.int32(image[v, u, k]) - np.int32(looks[v, u, k])))
+    return largest
+
+
+@kernel
+def _compare(image: Any, looks: Any, counts: Any, found: Any) -> None:
+    height, width = counts.shape
+    for v in range(height):
+        for u in range(width):
+            if counts[v, u] >= _KNOWN:
+                found[v, u] = CHANGED if _change(image, looks, v, u) > _CHANGE else SAME
+
+
+@kernel
+def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
+    height, width = counts.shape
+    for v in range(height):
+        for u in range(width):
+            count = counts[v, u]
+            if shows[v, u] != THING:
+                if count != 0:
+                    counts[v, u] = 0
+                continue
+            if count > 0 and _change(image, looks, v, u) <= _CHANGE:
+                counts[v, u] = min(count + 1, _LONGEST)
+                # Slow changes of the light are followed.
+                for k in range(looks.shape[2]):
+                    now, before = image[v, u, k], looks[v, u, k]
+                    looks[v, u, k] = before + np.uint8(now > before) - np.uint8(now < before)
+            elif count > _KNOWN:
+                # The object is covered.
+                counts[v, u] = count - 1
+            else:
+                counts[v, u] = 1
+                for k in range(looks.shape[2]):
+                    looks[v, u, k] = image[v, u, k]
 
 
 # Largest movement of a body part between frames: a hand at 3 m/s and 15 Hz.
@@ -164,9 +204,8 @@ class PersonRegion:
         if self._other is None:
             self._things.forget()
         elif image is not None:
-            self._things.learn(
-                image, (self._pixels(self._other, silhouette.shape) & silhouette) > 0
-            )
+            things = self._pixels(self._other, silhouette.shape) & silhouette
+            self._things.learn(image, things * np.uint8(THING))
         return selected
 
     def _kept(
@@ -265,6 +304,9 @@ def warm_up() -> None:
     cells = np.zeros((2, 8), np.uint8)
     _overlaps(*regions[:4], cells, cells, cells, cells, cells, 1, np.zeros((5, 1)))
     paint(*regions[:4], np.ones(1, np.bool_), np.uint8(255), silhouette)
+    things = StillThings()
+    things.learn(silhouette, silhouette)
+    things.compare(silhouette)
 
 
 def _cells(image: Mask, cell_px: int) -> Mask:

@@ -48,7 +48,7 @@ from cardbox_tracker.terms.term import Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.person_region import PersonRegion, StillThings
 from cardbox_tracker.tracking.precompile import quickest
 from cardbox_tracker.tracking.tracked_camera import TrackedCamera
 from cardbox_tracker.tracking.tracker import Tracker
@@ -134,6 +134,7 @@ def terms() -> SimpleNamespace:
         inner=InnerCue().build(colored, CAMERA),
         tracker=Tracker(colored, CAMERA, quickest(PRESETS["default"]().with_depth())),
         beside=TrackedCamera(BODY, CAMERA, PRESETS["default"]().with_depth(), BESIDE),
+        things=StillThings(),
     )
 
 
@@ -179,6 +180,12 @@ def decide(take: Take, numbers: Iterator[int]) -> None:
     if next(numbers) % 2:
         colored = take("u1", sides if sides is None or min(sides) >= 0 else None)
     decide_shadows(take(), take("f4"), take("f4"), colored, 0.6, 0.1, part)
+
+
+def compare_things(take: Take, _: Iterator[int]) -> None:
+    things = terms().things
+    things.learn(image_from(take(more=(3,))), take())
+    things.compare(image_from(take(more=(3,))))
 
 
 def select_person(take: Take, numbers: Iterator[int]) -> None:
@@ -277,6 +284,7 @@ CALLS: dict[str, Callable[[Take, Iterator[int]], Any]] = {
     "LightFollower": follow_light,
     "SilhouetteExtractor": extract,
     "BackgroundLearner": learn_background,
+    "StillThings": compare_things,
     "PersonRegion": select_person,
     "CompiledSilhouette": rate,
     "WholeBodyCost": rate_bodies,
