@@ -71,6 +71,8 @@ def evaluate_sessions(
     kinds = {folder: result_name(folder) for folder in folders}
     make_folder(output)
     compile_all()
+    # The code may change while it runs.
+    made = provenance()
     sessions: dict[str, list[dict[str, Any]]] = {kind: [] for kind in kinds.values()}
     work = [(kinds[folder], way) for folder in folders for way in ways[folder]]
     parallel = Parallel(jobs, return_as="generator", batch_size=1)
@@ -87,7 +89,7 @@ def evaluate_sessions(
             "preset": plan.preset,
             "seeds": list(plan.seeds),
             "sessions": found,
-            "provenance": provenance(),
+            "provenance": made,
         }
         _write(results[kind], output / f"{kind}.md")
     return results

@@ -247,11 +247,12 @@ def film_figures(
     run = run_of(film.session, body, "", by_stamp, [float("nan")])
     every = people_figures(film.session, run)
     found = {name: every[name] for name in _FIGURES if name in every}
-    pitch_deg = film.session.truth.pitch_deg
-    pitch_found_deg = np.nan if body is None else float(np.degrees(body.camera_pose.pitch_rad))
-    is_level = abs(pitch_found_deg - pitch_deg) <= FAR_DEG
-    found |= _other_verdicts(film.session, by_stamp, is_level)
-    return found | {"pitch_found_deg": pitch_found_deg, "pitch_deg": pitch_deg}
+    found["pitch_deg"] = film.session.truth.pitch_deg
+    is_level = False
+    if body is not None:
+        found["pitch_found_deg"] = float(np.degrees(body.camera_pose.pitch_rad))
+        is_level = abs(found["pitch_found_deg"] - found["pitch_deg"]) <= FAR_DEG
+    return found | _other_verdicts(film.session, by_stamp, is_level)
 
 
 def _other_verdicts(
@@ -263,8 +264,9 @@ def _other_verdicts(
         one = by_stamp.get(stamp_ns)
         if one is None or one.keypoints_m is None:
             continue
-        counts["vertical"] += one.vertical_state is KeypointState.TRACKED
-        counts["vertical_wrong"] += one.vertical_state is KeypointState.TRACKED and not is_level
+        if one.vertical_state is KeypointState.TRACKED:
+            counts["vertical"] += 1
+            counts["vertical_wrong"] += not is_level
         if one.place is not None and one.place.state is KeypointState.TRACKED:
             off_m = (one.keypoints_m - true_m)[list(SHOULDERS)].mean(axis=0)
             counts["place"] += 1
@@ -361,6 +363,8 @@ def evaluate_films(
         load_session(folder)
     report.parent.mkdir(parents=True, exist_ok=True)
     compile_all()
+    # The code may change while it runs.
+    made = provenance()
     films: list[dict[str, Any]] = []
     kinds = [(shape, "still") for shape in SHAPES]
     if is_moving:
@@ -377,7 +381,7 @@ def evaluate_films(
     results = {
         "command": f"cardbox evaluate --films {names} {how} --output DIR",
         "films": sorted(films, key=lambda film: (film["given"], film["shape"])),
-        "provenance": provenance(),
+        "provenance": made,
     }
     write_json(results, report.with_suffix(".json"))
     write_file(report, films_report(results))
