@@ -18,7 +18,7 @@ R = TypeVar("R")
 DETECTORS, EXPORTERS = "detectors", "exporters"
 
 _lock = threading.Lock()
-# The working directory, open once for each call of foreign code that runs.
+# The working directory, opened once more for each call of foreign code that runs.
 _folders: list[int] = []
 
 
@@ -57,7 +57,7 @@ def loaded(entry: EntryPoint) -> Any:
 def called(call: Callable[[], R], what: str, expected: str = "") -> R:
     """Return what foreign code returns; if it fails, raise CardboxError that begins with ``what``.
 
-    It may end with anything, such as what ends a program, and elsewhere among the folders.
+    It may change the working directory, and end with anything, such as what ends a program.
     """
     try:
         with _confined():
