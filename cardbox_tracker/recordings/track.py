@@ -204,6 +204,7 @@ class Quality:
         self.images = self.uncertain = self._sure_hands = self._sure_places = 0
         self._sure = self._vertical = self._filled = 0
         self._reasons, self._pitch = Counter[str](), (0.0, 0.0)
+        self._is_one_camera = True
         self.fits: list[tuple[int, float]] = []
         self._moments: list[_Moment] = []
         self._angles_rad: list[float] = []
@@ -215,6 +216,7 @@ class Quality:
     def __call__(self, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Count one image."""
         self.images += 1
+        self._is_one_camera = len(tracker.cameras) == 1
         chance = estimate.person_chance
         if chance is not None and chance != self._chance:
             self._chance = chance
@@ -271,11 +273,16 @@ class Quality:
             counts = (f"{why} ({count})" for why, count in self._reasons.most_common(_MOST_REASONS))
             yield f"postures are unsure where {', '.join(counts)}"
         if any(_ELSEWHERE in why for why in self._reasons):
-            yield (
+            words = (
                 "a posture is sure if all its joints are, so a hand can be sure where it is not: "
-                "see left_hand_state and right_hand_state. One camera hardly tells an arm towards "
-                "it from one away from it: film more from the front, or with a second camera"
+                "see left_hand_state and right_hand_state"
             )
+            if self._is_one_camera:
+                words += (
+                    ". One camera hardly tells an arm towards it from one away from it: film more "
+                    "from the front, or with a second camera"
+                )
+            yield words
         if self.fits and not self._vertical:
             pitch, stddev = np.degrees(self._pitch)
             yield (

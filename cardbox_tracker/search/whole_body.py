@@ -336,6 +336,9 @@ class WholeBodyFilter:
         evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
         source = doubt.Source.POINTS if self._cues else self._outline
         is_back = is_back or cost.facing_rad != 0.0
+        # What the first camera sees from behind, a further one may see from ahead.
+        others = (cost.to_views[number](result[None])[0, YAW] for number in self._seeing if number)
+        is_back = is_back and all(np.cos(yaw) <= 0.0 for yaw in others)
         evidence["back"] = np.full(6, float(is_back))
         veto = "" if is_trackable(cost, result) else "the person is too near, too far or cut off"
         veto = veto or (doubt.BACK if is_back else "")

@@ -26,9 +26,11 @@ BODY = BodyModel()
 
 
 class Frame:
+    cameras: tuple[None, ...] = (None,)
+    body = BODY
+
     def __init__(self, time_s: float) -> None:
         self.time_s = time_s
-        self.body = BODY
 
 
 def estimate(state: str, right: KeypointState = SURE, chance: float = 0.0) -> Estimate:
@@ -68,7 +70,9 @@ def test_sure_images_and_hands_are_counted() -> None:
     assert moments == "least sure, look at them: 1.0 s (right hand), 5.0 s (lost)"
 
 
-def test_why_hands_may_be_sure_where_the_posture_is_not_is_told() -> None:
+def test_why_hands_may_be_sure_where_the_posture_is_not_is_told(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     # What the doubt itself says of hands that may be wrong.
     values = {"slope": np.full(6, 1.0), "yaw": np.full(6, 1.5), "left over": np.zeros(6)}
     judged = Doubt().judge(values, Source.POINTS, np.zeros(6, np.bool_))
@@ -76,6 +80,9 @@ def test_why_hands_may_be_sure_where_the_posture_is_not_is_told() -> None:
     hint = lines((0.0, unsure))[2]
     assert "left_hand_state" in hint and "film more from the front" in hint
     assert not any("left_hand_state" in one for one in lines((0.0, estimate(TRACKING))))
+    monkeypatch.setattr(Frame, "cameras", (None, None))
+    hint = lines((0.0, unsure))[2]
+    assert "left_hand_state" in hint and "second camera" not in hint
 
 
 def test_a_hand_deviates_with_its_joints_and_the_distance_with_the_place() -> None:

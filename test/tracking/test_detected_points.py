@@ -455,27 +455,47 @@ def test_points_of_another_type_are_refused(points: Any, kind: str) -> None:
     assert values(tracker.track(person)) == values(fresh.track(person))
 
 
-def test_a_camera_behind_a_person_who_faces_the_first_one_does_not_turn_them(
-    detected: Detect,
-) -> None:
-    """Only the second camera has points, and sees the back."""
+def from_both_sides(detected: Detect, posture: np.ndarray, images: int) -> list[Estimate]:
+    """Track a still posture before two cameras that face each other.
+
+    The second one has points, and the first one if it sees the back.
+    """
     turn = np.diag([-1.0, 1.0, -1.0])
     other = OtherCamera(CAMERA, Extrinsics(turn, -turn @ [0.0, 0.0, 4.0]))
     view = View.of(GUESSED, CAMERA, other)
     tracker = Tracker(GUESSED, CAMERA, default_preset(), others=[other])
-    state = np.append(reference_posture("front"), [0.0, 0.0])
-    there = view.states(state)
+    there = view.states(np.append(posture, [0.0, 0.0]))
     placed = view.body.with_values(
         distance_m=view.body.placement.distance_m - there[12],
         hip_height_m=view.body.placement.hip_height_m + there[13],
     )
-    behind = render(cardbox_patches(placed, there[:12]), view.camera)
-    for number in range(4):
+    beyond = render(cardbox_patches(placed, there[:12]), view.camera)
+    estimates = []
+    for number in range(images):
         stamp_ns = BEGIN_NS + number * 66_666_667
+        here = None
+        if abs(posture[YAW]) > np.radians(90.0):
+            here = detected(GUESSED, CAMERA, posture, stamp_ns=stamp_ns)
         points = detected(view.body, view.camera, there, stamp_ns=stamp_ns)
         seen = [
-            Observation(silhouette(state[:12]), stamp_ns=stamp_ns),
-            Observation(behind, stamp_ns=stamp_ns, points=points),
+            Observation(silhouette(posture), stamp_ns=stamp_ns, points=here),
+            Observation(beyond, stamp_ns=stamp_ns, points=points),
         ]
-        estimate = tracker.track(seen)
+        estimates.append(tracker.track(seen))
+    return estimates
+
+
+def test_a_camera_behind_a_person_who_faces_the_first_one_does_not_turn_them(
+    detected: Detect,
+) -> None:
+    for estimate in from_both_sides(detected, reference_posture("front"), 4):
         assert estimate.posture is not None and abs(estimate.posture[YAW]) < np.radians(20.0)
+
+
+def test_a_person_whom_a_further_camera_sees_from_ahead_is_no_back(detected: Detect) -> None:
+    posture = reference_posture("front")
+    posture[YAW] = np.pi
+    last = from_both_sides(detected, posture, 6)[-1]
+    assert last.posture is not None
+    assert abs(abs(last.posture[YAW]) - np.pi) < np.radians(20.0)
+    assert (last.state, last.reason) == (TRACKING, "")
