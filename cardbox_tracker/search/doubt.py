@@ -307,6 +307,7 @@ def evidence_of_search(
 
 def evidence_of_arms(
     keypoints_m: FloatArray,
+    seen_m: FloatArray,
     rating: float,
     rated: tuple[FloatArray, FloatArray],
     mirrored: tuple[FloatArray, FloatArray],
@@ -316,7 +317,8 @@ def evidence_of_arms(
     One outline is that of several arms. They are those that the search ``rated``, keypoints (N, 6,
     3) and ratings (N,), and the ``mirrored`` images of the result in depth, whose outlines hardly
     differ: keypoints (6, 6, 3) and ratings (6,) with upper arm, forearm, and both, of the left arm,
-    then of the right one. ``keypoints_m`` (6, 3) and ``rating`` are of the result.
+    then of the right one. ``keypoints_m`` (6, 3) and ``rating`` are of the result, and ``seen_m``
+    (6, 3) its keypoints before the camera that shows it best.
 
     By name: ``better``, by how much states are rated worse in which the keypoint is more than
     ``FAR_M`` away (logarithm); ``sure``, that times how little the mirrored arms move it;
@@ -324,7 +326,7 @@ def evidence_of_arms(
     up to the keypoint are beside or above the trunk in the image, m.
     """
     found = np.zeros((4, 6))
-    _arms(keypoints_m, rating, *rated, *mirrored, found)
+    _arms(keypoints_m, seen_m, rating, *rated, *mirrored, found)
     return dict(zip(("better", "sure", "slope", "beside trunk"), found, strict=True))
 
 
@@ -342,6 +344,7 @@ def _apart_m(one_m: FloatArray, other_m: FloatArray, point: int) -> float:
 @kernel
 def _arms(
     points_m: FloatArray,
+    seen_m: FloatArray,
     rating: float,
     rated_m: FloatArray,
     ratings: FloatArray,
@@ -351,15 +354,13 @@ def _arms(
 ) -> None:
     """Write the evidence (4, 6) of :func:`evidence_of_arms`."""
     least, usual, most = _BETTER
-    middle_m = 0.5 * (points_m[0] + points_m[3])
-    breadth_m = sqrt(
-        (points_m[0, 0] - points_m[3, 0]) ** 2 + (points_m[0, 1] - points_m[3, 1]) ** 2
-    )
+    middle_m = 0.5 * (seen_m[0] + seen_m[3])
+    breadth_m = sqrt((seen_m[0, 0] - seen_m[3, 0]) ** 2 + (seen_m[0, 1] - seen_m[3, 1]) ** 2)
     best = min(rating, ratings.min())
     for arm in range(2):
         shoulder = 3 * arm
         beside_m = _BESIDE_M
-        upper_m, elbow_m = points_m[shoulder + 1] - points_m[shoulder], points_m[shoulder + 1]
+        upper_m, elbow_m = seen_m[shoulder + 1] - seen_m[shoulder], seen_m[shoulder + 1]
         along = abs((upper_m * elbow_m).sum())
         slope = along / (sqrt((upper_m**2).sum() * (elbow_m**2).sum()) + 1e-9)
         for point in range(shoulder + 1, shoulder + 3):
@@ -376,9 +377,9 @@ def _arms(
                     rival = min(rival, mirrored_ratings[i])
             better = log(min(max(rival - best, least), most) / usual)
             move_m = max(sqrt(squares / weights), _LEAST_MOVE_M)
-            scale = middle_m[2] / max(points_m[point, 2], 1e-3)
-            aside_m = abs(points_m[point, 0] * scale - middle_m[0]) - 0.5 * breadth_m
-            above_m = middle_m[1] - points_m[point, 1] * scale
+            scale = middle_m[2] / max(seen_m[point, 2], 1e-3)
+            aside_m = abs(seen_m[point, 0] * scale - middle_m[0]) - 0.5 * breadth_m
+            above_m = middle_m[1] - seen_m[point, 1] * scale
             beside_m = min(beside_m, max(aside_m, above_m, -_BESIDE_M))
             found[0, point] = better
             found[1, point] = max(better, 0.0) * max(log(FAR_M / move_m), 0.0)

@@ -319,13 +319,18 @@ class WholeBodyFilter:
         iou = iou_of(total, area_px, cost_px)
         pixels = float(total), float(cost.frontal_px_at(result)), float(area_px), float(cost_px)
         prior = float(ratings[0]) - float(cost_px) / max(total, 1)
-        ahead = result.copy()
-        ahead[YAW] -= cost.facing_rad
+        faced, ahead = self._faced(result)
+        seen_m = points.keypoints_m[0]
+        if faced:
+            seen_m = Posed(cost.costs[faced].body, ahead[None]).keypoints_m[0]
+        else:
+            ahead[YAW] -= cost.facing_rad
         evidence = doubt.evidence_of_search(
             pixels, prior, self._arm.spreads_m, (ahead, deviations), cost.body, self._age
         )
         evidence |= doubt.evidence_of_arms(
             points.keypoints_m[0],
+            seen_m,
             float(ratings[0]),
             (self.rated.keypoints_m, self.rated.ratings),
             (points.keypoints_m[1:], ratings[1:]),
@@ -335,10 +340,7 @@ class WholeBodyFilter:
             evidence |= cue.evidence(Posed(cost.costs[number].body, there))
         evidence["cameras"] = np.full(6, float(len(self._seeing) > 1))
         source = doubt.Source.POINTS if self._cues else self._outline
-        is_back = is_back or cost.facing_rad != 0.0
-        # What the first camera sees from behind, a further one may see from ahead.
-        others = (cost.to_views[number](result[None])[0, YAW] for number in self._seeing if number)
-        is_back = is_back and all(np.cos(yaw) <= 0.0 for yaw in others)
+        is_back = not faced and (is_back or cost.facing_rad != 0.0)
         evidence["back"] = np.full(6, float(is_back))
         veto = "" if is_trackable(cost, result) else "the person is too near, too far or cut off"
         veto = veto or (doubt.BACK if is_back else "")
@@ -359,6 +361,20 @@ class WholeBodyFilter:
             particles=Particles(*rated, mean, profile.spread),
             judged=judged,
         )
+
+    def _faced(self, result: FloatArray) -> tuple[int, FloatArray]:
+        """Return the camera that the person faces most, and the state (14,) before it.
+
+        It is the first one, which may see the back, if no further one sees the person from ahead.
+        """
+        best, state = 0, result.copy()
+        most = max(np.cos(result[YAW]), 0.0) if 0 in self._seeing else 0.0
+        for number in self._seeing:
+            there = self._cost.to_views[number](result)
+            if number and np.cos(there[YAW]) > most:
+                there[YAW] = np.angle(np.exp(1j * there[YAW]))
+                best, state, most = number, there, np.cos(there[YAW])
+        return best, state
 
     def _turned(self, found: FloatArray) -> FloatArray:
         """Return states (N, 14) that face as the points show, and search there from now on.

@@ -131,7 +131,7 @@ def test_evidence_of_arms_by_hand() -> None:
     mirrored = np.array([result_m, behind_m, behind_m, *[result_m] * 3])
     for rating in (0.10, 0.16):
         ratings = np.array([0.10, rating, rating, 0.10, 0.10, 0.10])
-        found = doubt.evidence_of_arms(result_m, 0.13, rated, (mirrored, ratings))
+        found = doubt.evidence_of_arms(result_m, result_m, 0.13, rated, (mirrored, ratings))
         # The best rating is 0.10. The mirrored hand is 0.4 m away, the hanging one 0.41.
         better = rating - 0.10
         assert found["better"][2] == pytest.approx(log(max(better, 1e-3) / 0.03))
@@ -149,7 +149,7 @@ def test_evidence_of_arms_by_hand() -> None:
     # Raised above the shoulders, 0.1 m at the depth of the shoulders.
     raised_m = arms_of((0.2, -0.1, 2.0))
     raised_m[1] = 0.4, -0.2, 2.0
-    found = doubt.evidence_of_arms(raised_m, 0.13, rated, (mirrored, ratings))
+    found = doubt.evidence_of_arms(raised_m, raised_m, 0.13, rated, (mirrored, ratings))
     assert found["beside trunk"][[1, 2]] == pytest.approx([0.2, 0.1])
 
 

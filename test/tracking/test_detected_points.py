@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from cardbox_tracker.applications.simulation.motions import wave
 from cardbox_tracker.camera.camera import Camera
@@ -455,13 +456,16 @@ def test_points_of_another_type_are_refused(points: Any, kind: str) -> None:
     assert values(tracker.track(person)) == values(fresh.track(person))
 
 
-def from_both_sides(detected: Detect, posture: np.ndarray, images: int) -> list[Estimate]:
-    """Track a still posture before two cameras that face each other.
+def from_two_sides(
+    detected: Detect, posture: np.ndarray, images: int, bearing_deg: float = 180.0
+) -> list[Estimate]:
+    """Track a still posture before two cameras whose lines of sight meet at 2 m.
 
-    The second one has points, and the first one if it sees the back.
+    The second one has points, and the first one if it does not see the front.
     """
-    turn = np.diag([-1.0, 1.0, -1.0])
-    other = OtherCamera(CAMERA, Extrinsics(turn, -turn @ [0.0, 0.0, 4.0]))
+    turn = Rotation.from_euler("y", bearing_deg, degrees=True).as_matrix()
+    middle_m = np.array([0.0, 0.0, 2.0])
+    other = OtherCamera(CAMERA, Extrinsics(turn, middle_m - turn @ middle_m))
     view = View.of(GUESSED, CAMERA, other)
     tracker = Tracker(GUESSED, CAMERA, default_preset(), others=[other])
     there = view.states(np.append(posture, [0.0, 0.0]))
@@ -474,7 +478,7 @@ def from_both_sides(detected: Detect, posture: np.ndarray, images: int) -> list[
     for number in range(images):
         stamp_ns = BEGIN_NS + number * 66_666_667
         here = None
-        if abs(posture[YAW]) > np.radians(90.0):
+        if posture[YAW] != 0.0:
             here = detected(GUESSED, CAMERA, posture, stamp_ns=stamp_ns)
         points = detected(view.body, view.camera, there, stamp_ns=stamp_ns)
         seen = [
@@ -488,14 +492,21 @@ def from_both_sides(detected: Detect, posture: np.ndarray, images: int) -> list[
 def test_a_camera_behind_a_person_who_faces_the_first_one_does_not_turn_them(
     detected: Detect,
 ) -> None:
-    for estimate in from_both_sides(detected, reference_posture("front"), 4):
+    for estimate in from_two_sides(detected, reference_posture("front"), 4):
         assert estimate.posture is not None and abs(estimate.posture[YAW]) < np.radians(20.0)
 
 
-def test_a_person_whom_a_further_camera_sees_from_ahead_is_no_back(detected: Detect) -> None:
+@pytest.mark.parametrize("yaw_deg", [180.0, 60.0, -60.0])
+def test_the_camera_that_the_person_faces_most_says_how_sure_the_posture_is(
+    detected: Detect, yaw_deg: float
+) -> None:
     posture = reference_posture("front")
-    posture[YAW] = np.pi
-    last = from_both_sides(detected, posture, 6)[-1]
-    assert last.posture is not None
-    assert abs(abs(last.posture[YAW]) - np.pi) < np.radians(20.0)
+    posture[YAW] = np.radians(yaw_deg)
+    last = from_two_sides(detected, posture, 6, bearing_deg=yaw_deg)[-1]
+    assert last.posture is not None and last.evidence is not None
+    off_rad = (last.posture[YAW] - posture[YAW] + np.pi) % (2 * np.pi) - np.pi
+    assert abs(off_rad) < np.radians(20.0)
+    # Before that camera the person is not turned, and the arms lie across the line of sight.
+    assert last.evidence["yaw"].max() < np.radians(20.0)
+    assert last.evidence["slope"].max() < 0.5
     assert (last.state, last.reason) == (TRACKING, "")
