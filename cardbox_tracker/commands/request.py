@@ -70,7 +70,8 @@ _REPLACED = MappingProxyType(
 
 
 def _cameras(given: str | Iterable[str]) -> tuple[str, ...]:
-    return (given,) if isinstance(given, str) else tuple(map(str, given))
+    names = (given,) if isinstance(given, str) else map(str, given)
+    return tuple(name for each in names for name in each.split(","))
 
 
 def _detector(given: Any) -> Any:

@@ -85,6 +85,9 @@ def test_python_asks_for_the_same_as_a_command_line(film: Path) -> None:
         hands=True,
     )
     assert asked == line(film, *words, *more) == replace(asked)
+    assert (
+        asked == line(film, *words, "--cameras", "a,b", *more[3:]) == replace(asked, cameras="a,b")
+    )
     assert isinstance(asked.background, TimeSpan) and asked.statures_m == (1.8, 1.6)
 
 
