@@ -17,6 +17,7 @@ from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import YAW, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
@@ -162,6 +163,13 @@ def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
     assert near.chance == pytest.approx(0.0101, abs=0.001)
     assert far.chance == pytest.approx(0.391, abs=0.005)
     assert (near.state, far.state) == (KeypointState.TRACKED, KeypointState.UNCERTAIN)
+
+
+def test_no_distance_is_sure_before_a_lens_that_nobody_knows() -> None:
+    guessed = replace(CAMERA, focal_stddev=GUESSED_STDDEV)
+    near = PlaceWatch(TALL, guessed).see(estimate_at(0.8, TALL), TALL, frames(None)[0])
+    # 0.3 m are 1.2 deviations of 0.24 m.
+    assert near is not None and near.state is KeypointState.UNCERTAIN
 
 
 def test_a_distance_that_is_only_guessed_is_uncertain_unless_depth_shows_it() -> None:
