@@ -44,7 +44,8 @@ def test_a_lag_lasts_while_nobody_moves_and_ends_with_the_clock() -> None:
 @pytest.mark.parametrize("speed", [0.01, 1.0])
 def test_other_motion_is_suspected_at_once_and_told_after_two_seconds(speed: float) -> None:
     """Who hardly moves shows nothing, and nor does the top of the silhouette alone."""
-    lag, top, there = MotionLag(), MotionLag(), speed * np.cumsum(RNG.normal(0, 0.1, (60, 5)), 0)
+    other = np.random.default_rng(1).normal(0, 0.1, (60, 5))
+    lag, top, there = MotionLag(), MotionLag(), speed * np.cumsum(other, 0)
     suspected, told = list[bool](), list[bool]()
     for i, (one, two) in enumerate(zip(speed * MOVES, there, strict=True)):
         lag.add(i * 50_000_000, one, two)
