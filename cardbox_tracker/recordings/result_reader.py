@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -415,12 +414,11 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
     found = _Messages()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
-        damaged = partial(_damaged, f"{message.topic} of {bag.path}")
         try:
             found.take(message.topic.removeprefix(space), message.time_ns, content)
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
-            raise damaged(error) from None
+            raise _damaged(f"{message.topic} of {bag.path}", error) from None
     if found.repeated > len(found.by_stamp):
         raise BagError(
             f"{bag.path} has {len(found.by_stamp) + found.repeated} results with "
