@@ -81,7 +81,8 @@ class _View:
     distance_m: float
 
     def widths(self) -> Widths:
-        return Widths(*(_extent_px(self.references[name]) for name in REFERENCE_NAMES))
+        across = (np.nonzero(self.references[name].any(axis=0))[0] for name in REFERENCE_NAMES)
+        return Widths(*(int(np.ptp(one)) + 1 if len(one) else 0 for one in across))
 
     def crown_m(self, name: str) -> float:
         """Return the height of the top of the head above the camera's centre."""
@@ -234,8 +235,3 @@ def _problem_of_height(view: _View, arms: _Arms) -> str:
                 "in a silhouette, because it has the colour of the background"
             )
     return ""
-
-
-def _extent_px(silhouette: Silhouette) -> int:
-    columns = np.nonzero(silhouette.any(axis=0))[0]
-    return int(columns[-1] - columns[0] + 1) if len(columns) else 0
