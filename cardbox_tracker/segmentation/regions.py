@@ -24,6 +24,12 @@ LEAST_AREA, MOST_HOLE = 0.004, 0.0008
 image."""
 
 
+def disk(radius_px: float) -> NDArray[np.uint8]:
+    """Return a disk of a radius of at least 1 px, for morphology."""
+    size = 2 * max(round(radius_px), 1) + 1
+    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
+
+
 class Regions(NamedTuple):
     """Connected regions of a binary image."""
 
