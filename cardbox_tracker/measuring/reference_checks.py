@@ -16,13 +16,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.outline import (
-    LevelArm,
-    level_arm,
-    row_heights_m,
-    span_m,
-    width_m,
-)
+from cardbox_tracker.measuring.outline import LevelArm, level_arm, row_heights_m, span_m, width_m
 from cardbox_tracker.measuring.references import POSTURE_TEXT, Silhouette, rounded_down, rounded_up
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
 from cardbox_tracker.person.posture import REFERENCE_NAMES

@@ -50,14 +50,7 @@ from cardbox_tracker.person.posture import place_limits
 from cardbox_tracker.person.proportions import SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.rep155 import rep155_skeleton
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    FIXED,
-    POSTURE_GROUPS,
-    PRISMATIC,
-    SKELETON,
-    Group,
-    Joint,
-)
+from cardbox_tracker.person.skeleton import FIXED, POSTURE_GROUPS, PRISMATIC, SKELETON, Group, Joint
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]

@@ -12,18 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import BagError, CardboxError, quoted, reason_of
-from cardbox_tracker.common.files import (
-    body_beside,
-    body_of_person,
-    foreign,
-    table_rows,
-)
+from cardbox_tracker.common.files import body_beside, body_of_person, foreign, table_rows
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import (
-    dumps_body_model,
-    load_body_model,
-    loads_body_model,
-)
+from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     HAND_OPEN_NAMES,
@@ -35,12 +26,7 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
-from cardbox_tracker.recordings.outputs import (
-    chances_of,
-    joints_of,
-    known_deviations,
-    person_space,
-)
+from cardbox_tracker.recordings.outputs import chances_of, joints_of, known_deviations, person_space
 from cardbox_tracker.recordings.result_table import (
     DECIMALS,
     PARQUET,
@@ -53,14 +39,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import (
-    FILLED,
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-)
+from cardbox_tracker.tracking.estimate import FILLED, LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"

@@ -18,12 +18,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import (
-    TORSO_X,
-    TORSO_Y,
-    TORSO_Z,
-    state_limits,
-)
+from cardbox_tracker.person.posture import TORSO_X, TORSO_Y, TORSO_Z, state_limits
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms import body_priors as priors
 from cardbox_tracker.terms import whole_body_kernels as kernels
@@ -41,15 +36,7 @@ from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.terms.kernel_arguments import Drawn, body_tuple, intrinsics_of, place_of
 from cardbox_tracker.terms.outline import Outline
 from cardbox_tracker.terms.pose_prior import load_gmm
-from cardbox_tracker.terms.term import (
-    ARM,
-    ARMS,
-    TRUNK,
-    WHOLE,
-    Posed,
-    Silhouette,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARM, ARMS, TRUNK, WHOLE, Posed, Silhouette, TermObservation
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.terms.whole_body_kernels import ObservedTuple, Points
 

@@ -15,12 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import CameraError, InitializationError
 from cardbox_tracker.common.settings import Settings
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.measuring.scale import (
-    DepthReference,
-    depth_scale,
-    measured_scale,
-    scaled,
-)
+from cardbox_tracker.measuring.scale import DepthReference, depth_scale, measured_scale, scaled
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.arm_search import ARM_LIMITS
@@ -29,13 +24,7 @@ from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.search.whole_body_config import SEVERAL_CAMERAS
 from cardbox_tracker.terms.depth import Depth, DepthTerm
 from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.term import (
-    ARM,
-    TRUNK,
-    Frame,
-    Posed,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARM, TRUNK, Frame, Posed, TermObservation
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
