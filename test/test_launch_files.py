@@ -560,10 +560,10 @@ def test_arguments_are_what_the_parameters_of_the_same_name_are() -> None:
                 kind = getattr(types[argument], "__origin__", types[argument])
                 assert mine.kind is kind or (mine.kind, kind) == (Path, str), argument
                 assert set(mine.choices) == set(spec.choices), argument
-                if spec.minimum is not None:
+                if spec.limits is not None:
                     # A parameter may have one more value, for what is not given.
                     assert mine.limits is not None, argument
                     lowest, highest = mine.limits
-                    assert spec.minimum <= lowest < highest <= spec.maximum, argument
+                    assert spec.limits[0] <= lowest < highest <= spec.limits[1], argument
                 compared += 1
     assert compared > 15

@@ -5,12 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cardbox_tracker.applications.exporting.formats import (
-    NUMBER,
-    export_all,
-    filtered,
-    formats,
-)
+from cardbox_tracker.applications.exporting.formats import NUMBER, export_all, filtered, formats
 from cardbox_tracker.commands.arguments import (
     TrackedResults,
     Written,

@@ -17,12 +17,7 @@ from cardbox_tracker.applications.ergonomics.recording import (
     score_rula,
 )
 from cardbox_tracker.applications.ergonomics.report import PageContent
-from cardbox_tracker.applications.ergonomics.rula import (
-    RULA,
-    ErgonomicConfig,
-    Method,
-    RulaConfig,
-)
+from cardbox_tracker.applications.ergonomics.rula import RULA, ErgonomicConfig, Method, RulaConfig
 from cardbox_tracker.commands.arguments import (
     TrackedResults,
     Written,

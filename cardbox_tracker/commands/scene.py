@@ -99,7 +99,7 @@ def measured_scene(
             turns = turns_in(source, watched, *span) if moves else None
             background = Background(moves)
             if turns is not None:
-                recording = recording.turned_back(turns[0])
+                recording = replace(recording, turned=turns[0])
                 source = opened(recording)
                 choice = choice and turns[0].placed(choice)
                 watched, first = watch(source, *span, choice), source.first

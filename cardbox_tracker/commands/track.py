@@ -71,7 +71,8 @@ def _track_shots(asked: Request, faults: Iterable[str]) -> None:
         changed: dict[str, Any] = {"start_s": span.start_s, "end_s": span.end_s}
         for name in _FILES:
             path = getattr(asked, name)
-            changed[name] = None if path is None else _of_shot(path, number)
+            if path is not None and number > 1:
+                changed[name] = path.with_name(f"{path.stem}.shot_{number}{path.suffix}")
         try:
             track_one(replace(asked, **changed))
         except CardboxError as error:
@@ -79,10 +80,6 @@ def _track_shots(asked: Request, faults: Iterable[str]) -> None:
             if left_out == len(spans):
                 raise
             print_remarks([f"shot {number} is left out: {error}"])
-
-
-def _of_shot(path: Path, number: int) -> Path:
-    return path if number == 1 else path.with_name(f"{path.stem}.shot_{number}{path.suffix}")
 
 
 def track(

@@ -27,11 +27,7 @@ import numpy as np
 import cardbox_tracker
 from cardbox_tracker.commands.request import FORMATS, TABLES, TrackArguments, with_own_options
 from cardbox_tracker.commands.tracking import track
-from cardbox_tracker.commands.tracking_request import (
-    TrackFiles,
-    TrackingRequest,
-    tracking_request,
-)
+from cardbox_tracker.commands.tracking_request import TrackFiles, TrackingRequest, tracking_request
 from cardbox_tracker.common import interrupts
 from cardbox_tracker.common.errors import CardboxError, plain
 from cardbox_tracker.common.files import (

@@ -13,7 +13,6 @@ from cardbox_tracker.commands.arguments import Written, at_least, check_outputs,
 from cardbox_tracker.common.errors import CardboxError, RosMissingError
 
 if TYPE_CHECKING:
-    from cardbox_tracker.applications.viewing.scene import Scene
     from cardbox_tracker.recordings.truth import TrueFrame
 
 _TRUTH = "ground_truth.json"
@@ -61,7 +60,11 @@ def run(given: Arguments) -> None:
             print(f"open {address} in a browser; Ctrl-C ends", flush=True)
         scene = Scene(stream, truth)
         if results is None:
-            _show_nodes(scene)
+            try:
+                from cardbox_tracker.ros.live_view import show_nodes
+            except ImportError as error:
+                raise RosMissingError(error) from None
+            show_nodes(scene)
         else:
             with progress_bar("view") as show:
                 count = show_results(results, scene, show, given.person)
@@ -73,14 +76,6 @@ def run(given: Arguments) -> None:
                         time.sleep(1.0)
     if given.save is not None:
         print(f"wrote {given.save}; look at it with 'rerun {given.save}'")
-
-
-def _show_nodes(scene: Scene) -> None:
-    try:
-        from cardbox_tracker.ros.live_view import show_nodes
-    except ImportError as error:
-        raise RosMissingError(error) from None
-    show_nodes(scene)
 
 
 def _truth_of(

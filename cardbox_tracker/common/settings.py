@@ -28,17 +28,9 @@ class Setting:
 
     description: str  #: its effect, in one sentence or phrase
     unit: str = ""  #: its unit; empty for a plain number or a text
-    minimum: float | None = None  #: smallest allowed value; None without a limit
-    maximum: float | None = None  #: largest allowed value; None without a limit
+    limits: tuple[float, float] | None = None  #: smallest and largest allowed value, if there are
     choices: tuple[str, ...] = ()  #: the allowed texts; empty if any text is allowed
     restarts: bool = False  #: True if tracking has to start again when it changes
-
-    @property
-    def limits(self) -> tuple[float, float] | None:
-        """Smallest and largest allowed value; None without limits."""
-        if self.minimum is None or self.maximum is None:
-            return None
-        return self.minimum, self.maximum
 
     @property
     def range_text(self) -> str:
@@ -93,8 +85,7 @@ def setting(
     restarts: bool = False,
 ) -> Any:
     """Return a dataclass field with a default and its :class:`Setting`."""
-    lowest, highest = limits or (None, None)
-    made = Setting(description, unit, lowest, highest, choices, restarts)
+    made = Setting(description, unit, limits, choices, restarts)
     return field(default=default, metadata={"setting": made})
 
 

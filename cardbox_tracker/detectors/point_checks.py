@@ -8,7 +8,7 @@ from math import isfinite
 
 import numpy as np
 
-from cardbox_tracker.common.errors import CardboxError, quoted
+from cardbox_tracker.common.errors import CardboxError, cut, quoted
 from cardbox_tracker.detectors.image_points import POINT_NAMES, ImagePoints
 
 Size = tuple[int, int]
@@ -41,7 +41,7 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
     """Raise CardboxError if a score is no chance, or, above 0, its place far off the image."""
     name, column, row, score, *_ = point
     if not _LEAST_SCORE <= score <= _MOST_SCORE:
-        raise CardboxError(f"{name} has the score {score:g}; expected a chance from 0 to 1")
+        raise CardboxError(f"{cut(name)} has the score {score:g}; expected a chance from 0 to 1")
     if score <= 0.0:
         return
     far_px = np.inf if size is None else _MOST_OUTSIDE * max(size)
@@ -49,8 +49,8 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
     if not all(isfinite(at) and -far_px <= at <= side + far_px for at, side in sides):
         of = "" if size is None else f" of {size[0]}x{size[1]} px"
         raise CardboxError(
-            f"{name} is at {quoted((column, row))} px; expected a place in the camera's image{of}, "
-            "or the score 0 if the point is missing"
+            f"{cut(name)} is at {quoted((column, row))} px; expected a place in the camera's "
+            f"image{of}, or the score 0 if the point is missing"
         )
 
 

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import Calibration
-from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
+from cardbox_tracker.common.errors import CardboxError, cut, quoted, reason_of
 from cardbox_tracker.common.files import UnreadableFileError, foreign, table_rows
 from cardbox_tracker.detectors.image_points import (
     LEG_POINT_NAMES,
@@ -138,8 +138,8 @@ class PointTable(NamedTuple):
                     first_lines.setdefault(key, rows.line_num)
                     if joint in joints:
                         raise CardboxError(
-                            f"{kind} {image} has {joint} again; with several people, give a column "
-                            f"{_PERSON}"
+                            f"{kind} {image} has {cut(joint)} again; with several people, give a "
+                            f"column {_PERSON}"
                         )
                     if score > 0.0 and joint in _USED:
                         joints[joint] = [u, v, score, *(float(row[x] or "nan") for x in space)]

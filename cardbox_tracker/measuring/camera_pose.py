@@ -26,12 +26,7 @@ from cardbox_tracker.measuring.silhouette_tangents import TopTangents
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.outline_distances import (
-    HALF_PX,
-    STATE_STEP,
-    SeenOutline,
-    comparing,
-)
+from cardbox_tracker.terms.outline_distances import HALF_PX, STATE_STEP, SeenOutline, comparing
 from cardbox_tracker.terms.term import Silhouette
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig

@@ -28,11 +28,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.given_arrays import image_from, silhouette_from
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.common.settings import settings_or
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-    check_fit,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult, check_fit
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.part_colors import can_learn, learn_appearance
 from cardbox_tracker.measuring.reference_checks import check_postures

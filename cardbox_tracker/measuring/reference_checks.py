@@ -16,13 +16,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.outline import (
-    LevelArm,
-    level_arm,
-    row_heights_m,
-    span_m,
-    width_m,
-)
+from cardbox_tracker.measuring.outline import LevelArm, level_arm, row_heights_m, span_m, width_m
 from cardbox_tracker.measuring.references import POSTURE_TEXT, Silhouette, rounded_down, rounded_up
 from cardbox_tracker.measuring.skeleton import BREADTH_OF_SPAN
 from cardbox_tracker.person.posture import REFERENCE_NAMES
@@ -81,7 +75,8 @@ class _View:
     distance_m: float
 
     def widths(self) -> Widths:
-        return Widths(*(_extent_px(self.references[name]) for name in REFERENCE_NAMES))
+        across = (np.nonzero(self.references[name].any(axis=0))[0] for name in REFERENCE_NAMES)
+        return Widths(*(int(np.ptp(one)) + 1 if len(one) else 0 for one in across))
 
     def crown_m(self, name: str) -> float:
         """Return the height of the top of the head above the camera's centre."""
@@ -234,8 +229,3 @@ def _problem_of_height(view: _View, arms: _Arms) -> str:
                 "in a silhouette, because it has the colour of the background"
             )
     return ""
-
-
-def _extent_px(silhouette: Silhouette) -> int:
-    columns = np.nonzero(silhouette.any(axis=0))[0]
-    return int(columns[-1] - columns[0] + 1) if len(columns) else 0

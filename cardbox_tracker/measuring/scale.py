@@ -17,10 +17,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import BodyModelError, CameraError, InitializationError
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.depth import Depth, DepthTerm

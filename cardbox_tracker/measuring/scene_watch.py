@@ -14,12 +14,7 @@ from typing import Generic, TypeVar
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.detectors.image_points import ImagePoints
-from cardbox_tracker.measuring.scene_camera import (
-    FoundCamera,
-    Picture,
-    degrees_of,
-    scene_camera,
-)
+from cardbox_tracker.measuring.scene_camera import FoundCamera, Picture, degrees_of, scene_camera
 from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.terms.term import Image
 

@@ -28,18 +28,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.measuring.outline import (
-    axes_distance_m,
-    level_arm,
-    span_m,
-    width_m,
-)
+from cardbox_tracker.measuring.outline import axes_distance_m, level_arm, span_m, width_m
 from cardbox_tracker.measuring.references import Silhouette, lateral_m
-from cardbox_tracker.measuring.shoulders import (
-    robust_mean,
-    shoulder_height_m,
-    shoulders_forward_m,
-)
+from cardbox_tracker.measuring.shoulders import robust_mean, shoulder_height_m, shoulders_forward_m
 from cardbox_tracker.person.sizes import FloatArray
 
 KNUCKLES_SHARE = 0.876

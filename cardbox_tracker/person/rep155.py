@@ -93,17 +93,15 @@ def rep155_skeleton() -> Iterator[Joint]:
         changed[third]["moves"] = f"{letter}_shoulder"
         changed[fourth] = {"limits": bend, "offset": elbow}
     fixed = Group.END, "r_waist", FIXED, X, (0.0, 0.0)
-    yield Joint("torso", *fixed, "torso", "torso", _shoulders)
+    yield Joint(
+        *("torso", *fixed, "torso", "torso"), lambda parts: (0.0, 0.0, parts.shoulder_height_m)
+    )
     for joint in skeleton:
         name = joint.rep155
         row = joint._replace(name=name, parent=names.get(joint.parent, ""), moves=name)
         if joint.parent == "torso_roll":
             row = row._replace(parent="torso", offset=_from_shoulders(joint))
         yield row._replace(**changed.get(joint.name, {}))
-
-
-def _shoulders(parts: BodyParts[float]) -> Point:
-    return 0.0, 0.0, parts.shoulder_height_m
 
 
 def _from_shoulders(joint: Joint) -> Offset:

@@ -50,14 +50,7 @@ from cardbox_tracker.person.posture import place_limits
 from cardbox_tracker.person.proportions import SHANK_SHARE, THIGH_SHARE, stature_of
 from cardbox_tracker.person.rep155 import rep155_skeleton
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    FIXED,
-    POSTURE_GROUPS,
-    PRISMATIC,
-    SKELETON,
-    Group,
-    Joint,
-)
+from cardbox_tracker.person.skeleton import FIXED, POSTURE_GROUPS, PRISMATIC, SKELETON, Group, Joint
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
@@ -126,9 +119,11 @@ def rep155_urdf(body: BodyModel, body_id: str, optical_frame: str, torso_place: 
     clavicles, which the joint states then must contain.
     """
     robot = _Robot(f"human_{body_id}", optical_frame, f"_{body_id}")
-    hips_m, turned = _seen_from_camera(body)
-    moving = {*(Group if torso_place else POSTURE_GROUPS)}
-    robot.add(body, tuple(rep155_skeleton()), moving, optical_frame, hips_m, turned)
+    # The hips in the optical frame while d1 is 0.
+    rotation, moving = _optical(body), {*(Group if torso_place else POSTURE_GROUPS)}
+    hips_m = rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)
+    placed = optical_frame, hips_m.tolist(), _rpy(rotation)
+    robot.add(body, tuple(rep155_skeleton()), moving, *placed)
     parts = body_parts(body.sizes)
     robot.show("r_waist", "torso", parts.waist)
     robot.show("torso", "torso", parts.torso, parts.shoulder_height_m)
@@ -217,13 +212,6 @@ class _Robot:
 def _text(values: Iterable[float]) -> str:
     # Adding 0.0 turns a negative zero into a plain one.
     return " ".join(f"{value + 0.0:.12g}" for value in values)
-
-
-def _seen_from_camera(body: BodyModel) -> tuple[Vector, Vector]:
-    """Return place and roll, pitch, yaw of the hips in the optical frame while d1 is 0."""
-    rotation = _optical(body)
-    x, y, z = (rotation @ (-body.placement.distance_m, 0.0, body.placement.hip_height_m)).tolist()
-    return (x, y, z), _rpy(rotation)
 
 
 def _optical(body: BodyModel) -> FloatArray:

@@ -20,12 +20,7 @@ from rosbags.typesys import Stores, get_typestore
 from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.camera.camera_info import calibration_from_info, is_other_lens
-from cardbox_tracker.camera.encodings import (
-    Levels,
-    SentImage,
-    decode_as_sent,
-    decode_compressed,
-)
+from cardbox_tracker.camera.encodings import Levels, SentImage, decode_as_sent, decode_compressed
 from cardbox_tracker.camera.frames import OneFrame
 from cardbox_tracker.camera.stamps import RecordedStamps, StampOrder
 from cardbox_tracker.camera.zoom import ZoomWitness

@@ -12,11 +12,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import median_depth
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.person_choice import PersonChoice
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-    fit_text,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult, fit_text
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.measuring.references import average_silhouette
 from cardbox_tracker.measuring.scale import (

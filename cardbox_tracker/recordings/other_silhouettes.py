@@ -22,11 +22,7 @@ from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
 from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
-from cardbox_tracker.segmentation.silhouettes import (
-    WITHIN_LIMITS_M,
-    nearest_m,
-    silhouette_within,
-)
+from cardbox_tracker.segmentation.silhouettes import WITHIN_LIMITS_M, nearest_m, silhouette_within
 
 
 def depth_images(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from itertools import compress
 from pathlib import Path
@@ -139,12 +139,6 @@ class Recording:
         is_alone = len(self.sources) == 1 and self._depth is None
         self._tolerance_ns = 0 if is_alone else self.first.period_ns() // 2
 
-    def check_points(self) -> None:
-        """Raise CardboxError if the given points of no camera could be used in any image."""
-        faults = [source.points_fault for source in self.sources]
-        if all(faults):
-            raise CardboxError(faults[0])
-
     def frames(self, start_s: float = 0.0, end_s: float = math.inf) -> Iterator[FrameSet]:
         """Yield synchronized frames from ``start_s`` to ``end_s``; each image is in one set."""
         # Images slightly before the start can belong to the first set.
@@ -155,7 +149,9 @@ class Recording:
             # What the detector found was kept of whole films.
             others = zip(self._used, self.sources[1:], strict=True)
             streams = [self.first.frames(), *(film.frames(source) for film, source in others)]
-        depths = self._depths()
+        depths: Iterator[tuple[int, DepthImage]] = iter(())
+        if self._depth is not None and self._depth != STEREO:
+            depths = depth_images(self.first.path, self._depth, self.first.camera)
         depth = next(depths, None)
         black = np.zeros((self.first.camera.height, self.first.camera.width), np.uint8)
         for frames in side_by_side(streams, lambda frame: frame.stamp_ns, self._tolerance_ns):
@@ -179,12 +175,6 @@ class Recording:
             first = frames[0] or RecordedFrame(stamp_ns, time_s, black, black)
             picture = partial(self.first.full_picture, first)
             yield FrameSet(stamp_ns, time_s, frames, first, there, picture)
-
-    def _depths(self) -> Iterator[tuple[int, DepthImage]]:
-        """Yield stamp and depth of each depth image, at the size of the first camera."""
-        if self._depth is None or self._depth == STEREO:
-            return iter(())
-        return depth_images(self.first.path, self._depth, self.first.camera)
 
 
 class FurtherFilm(NamedTuple):
@@ -223,10 +213,6 @@ class RecordingRequest:
         is_detected = isinstance(self.silhouettes, Detector)
         is_alone = len(self.cameras) < 2 and self.depth is None
         return is_detected and is_alone and not isinstance(self.points, PointTable)
-
-    def turned_back(self, turned: Turned) -> RecordingRequest:
-        """Return the same recording with its images turned back."""
-        return replace(self, turned=turned)
 
     @contextmanager
     def open(self) -> Iterator[Recording]:

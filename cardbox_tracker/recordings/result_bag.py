@@ -14,11 +14,7 @@ from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.messages import message_of
-from cardbox_tracker.recordings.outputs import (
-    OutputStream,
-    joint_values,
-    person_space,
-)
+from cardbox_tracker.recordings.outputs import OutputStream, joint_values, person_space
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.recordings.track import Observer
 from cardbox_tracker.tracking.estimate import Estimate

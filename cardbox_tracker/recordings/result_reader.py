@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import BagError, CardboxError, quoted, reason_of
-from cardbox_tracker.common.files import (
-    body_beside,
-    body_of_person,
-    foreign,
-    table_rows,
-)
+from cardbox_tracker.common.files import body_beside, body_of_person, foreign, table_rows
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.model_file import (
-    dumps_body_model,
-    load_body_model,
-    loads_body_model,
-)
+from cardbox_tracker.person.model_file import dumps_body_model, load_body_model, loads_body_model
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     HAND_OPEN_NAMES,
@@ -36,12 +26,7 @@ from cardbox_tracker.person.skeleton import (
 )
 from cardbox_tracker.recordings.bag_reader import BagReader, stamp_ns_of
 from cardbox_tracker.recordings.open_images import is_bag
-from cardbox_tracker.recordings.outputs import (
-    chances_of,
-    joints_of,
-    known_deviations,
-    person_space,
-)
+from cardbox_tracker.recordings.outputs import chances_of, joints_of, known_deviations, person_space
 from cardbox_tracker.recordings.result_table import (
     DECIMALS,
     PARQUET,
@@ -54,14 +39,7 @@ from cardbox_tracker.recordings.result_table import (
     units,
 )
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import (
-    FILLED,
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-)
+from cardbox_tracker.tracking.estimate import FILLED, LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
 MODEL = "/body_model"
@@ -415,12 +393,11 @@ def results_in(bag: BagReader, person: int | None = None) -> Results:
     found = _Messages()
     for message in bag.messages([topic for topic in topics if topic in bag.topics]):
         content = bag.deserialize(message)
-        damaged = partial(_damaged, f"{message.topic} of {bag.path}")
         try:
             found.take(message.topic.removeprefix(space), message.time_ns, content)
         except (AttributeError, TypeError, ValueError) as error:
             # The message type is defined by the recording and may lack fields.
-            raise damaged(error) from None
+            raise _damaged(f"{message.topic} of {bag.path}", error) from None
     if found.repeated > len(found.by_stamp):
         raise BagError(
             f"{bag.path} has {len(found.by_stamp) + found.repeated} results with "

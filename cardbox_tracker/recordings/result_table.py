@@ -30,9 +30,7 @@ from cardbox_tracker.person.skeleton import (
     KeypointState,
     names_of,
 )
-from cardbox_tracker.recordings.outputs import (
-    keypoint_states,
-)
+from cardbox_tracker.recordings.outputs import keypoint_states
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
 from cardbox_tracker.tracking.estimate import Estimate, Hand, Legs
 

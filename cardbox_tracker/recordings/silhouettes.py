@@ -240,12 +240,6 @@ class SilhouetteSource:
             return prepared._replace(found=self._bag.detected(detect, stamp_ns, image))
         return prepared._replace(found=detect(image))
 
-    def _images_until(self, end_s: float, start_s: float) -> Iterator[PreparedImage]:
-        """Yield images to ``end_s``, from ``start_s`` on with whom the detector finds meanwhile."""
-        within = takewhile(lambda one: one.time_s <= end_s, self.images(end_s))
-        look = partial(self._looked_at, start_s=start_s)
-        return within if self._detector is None else results_ahead(look, within)
-
     @property
     def calibration(self) -> Calibration:
         """The calibration of the recorded images."""
@@ -266,7 +260,13 @@ class SilhouetteSource:
         # The background adapts from the first image on, so frames do not depend on the span.
         self._pipeline.restart()
         self._start_points(start_s, end_s)
-        for prepared in self._images_until(end_s, start_s):
+        within: Iterator[PreparedImage] = takewhile(
+            lambda one: one.time_s <= end_s, self.images(end_s)
+        )
+        if self._detector is not None:
+            # It finds whoever is there meanwhile.
+            within = results_ahead(partial(self._looked_at, start_s=start_s), within)
+        for prepared in within:
             silhouette = self._silhouette(prepared)
             if prepared.time_s >= start_s:
                 yield self._frame(prepared, silhouette)

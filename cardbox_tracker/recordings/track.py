@@ -143,7 +143,9 @@ def track_recording(
             raise CardboxError(
                 f"no image lies after --start {start_s:g} s; give seconds from its start"
             )
-        recording.check_points()
+        faults = [source.points_fault for source in recording.sources]
+        if all(faults):
+            raise CardboxError(faults[0])
     session.check_cameras(is_last=True)
     bodies = [tracker.body for tracker in session.trackers]
     optional = ("points", first.has_points), ("depth", recording.measures_depth)
@@ -158,20 +160,17 @@ def track_recording(
         each = {n: _summary([quality], body) for n, (quality, body) in enumerate(pairs, 1)}
     # Of several people, there may be nobody.
     body = bodies[0] if bodies else None
-    remarks = [*_cut_remarks(cuts_s), *session.remarks(recording.names, is_all=True)]
-    summary = _summary(found, body, remarks)
-    return replace(summary, used=used, people=each)
-
-
-def _cut_remarks(cuts_s: Sequence[float]) -> Iterator[str]:
-    """Yield what follows from the cuts of a film at these times, s, if it has any."""
+    remarks = session.remarks(recording.names, is_all=True)
     if cuts_s:
-        yield (
+        remarks.insert(
+            0,
             f"the film is cut at {', '.join(f'{one:.1f}' for one in cuts_s)} s: each time tracking "
             "starts anew, and people are known by the colours of the trunk alone, if several are "
             "told apart; pitch and height of the camera are those of the longest shot, so leans "
-            "and places are right in that one: give --shots to track each by itself"
+            "and places are right in that one: give --shots to track each by itself",
         )
+    summary = _summary(found, body, remarks)
+    return replace(summary, used=used, people=each)
 
 
 _MOST_REASONS, _ELSEWHERE = 3, "hand may be elsewhere"

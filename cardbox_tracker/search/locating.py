@@ -69,7 +69,7 @@ class Location(NamedTuple):
 
     bearing: float  #: lateral coordinate over depth of the silhouette's middle in the first camera
     step_m: float  #: lateral motion of the middle since the last frame, metres
-    #: ``torso_x`` of the intersection of the lines of sight; None if it is not computed.
+    #: ``torso_x`` of the intersection of the lines of sight; None with one camera.
     x_m: float | None = None
     #: standard deviation of ``x_m``; None if the lines do not determine it.
     x_stddev_m: float | None = None
@@ -78,15 +78,9 @@ class Location(NamedTuple):
 class Locator:
     """Tracks the place and the walking direction of the person."""
 
-    def __init__(
-        self, cost: MultiViewCost, distance_m: float, views: Sequence[View], crosses: bool
-    ) -> None:
-        """Prepare for ``views`` of further cameras; ``distance_m`` is that of the body model.
-
-        ``crosses`` says whether the intersection of the lines of sight is computed.
-        """
-        self._cost, self._distance_m = cost, distance_m
-        self._views, self._crosses = views, crosses
+    def __init__(self, cost: MultiViewCost, distance_m: float, views: Sequence[View]) -> None:
+        """Prepare for ``views`` of further cameras; ``distance_m`` is that of the body model."""
+        self._cost, self._distance_m, self._views = cost, distance_m, views
         self.forget()
 
     def forget(self) -> None:
@@ -110,7 +104,7 @@ class Locator:
         if 0 in seeing:
             ahead_m = self._distance_m - float(before[TORSO_X])
             step_m = self._walk.see(frames[0].silhouette, bearings[0], ahead_m)
-        if not self._crosses:
+        if not self._views:
             return Location(bearings[0], step_m)
         there = float(before[TORSO_X]) - self._distance_m, float(before[TORSO_Y])
         x, y = crossing_of([self._line(*one) for one in bearings.items()], there)

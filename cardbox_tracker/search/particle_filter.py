@@ -12,12 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.search.config import FilterConfig
-from cardbox_tracker.search.particle_kernels import (
-    clip,
-    propagate,
-    weighted_mean,
-    weighted_stddev,
-)
+from cardbox_tracker.search.particle_kernels import clip, propagate, weighted_mean, weighted_stddev
 from cardbox_tracker.search.resampling import Indices, resample
 
 FloatArray = NDArray[np.float64]

@@ -127,13 +127,18 @@ class PersonPresence:
 
         The cost has the silhouettes of ``frames``; ``near`` (14,) is the state of the last frame.
         """
-        found = []
-        for share, frame in zip(self._cost.shares(near), frames, strict=True):
+        found, (smallest, largest) = list[Presence](), self._limits
+        # The area where the model is largest, and where it is smallest, as shares of its own.
+        for (low, high), frame in zip(self._cost.shares(near), frames, strict=True):
             is_detected = frame.points is not None and frame.points.are_certain
-            one = presence_of(*share, *self._limits, is_detected)
             # Others may hide nearly all of a person whose joints are seen.
             is_hidden = is_detected and frame["covered"] is not None
-            found.append(Presence.PERSON if is_hidden else one)
+            # Whom a detector finds may be smaller, and a spoilt silhouette does no harm.
+            if high < smallest and not (is_detected and high > 0.0) and not is_hidden:
+                found.append(Presence.NOBODY)
+            else:
+                is_more = low > largest and not is_detected
+                found.append(Presence.TOO_MUCH if is_more else Presence.PERSON)
         self._too_much = self._too_much + 1 if Presence.TOO_MUCH in found else 0
         if self._is_too_long_too_much:
             found = [
@@ -152,16 +157,3 @@ class PersonPresence:
 
 def _is_full(frame: Frame) -> bool:
     return frame.foreground_px > _FULL * frame.rows * frame.camera.width
-
-
-def presence_of(
-    low: float, high: float, smallest: float, largest: float, is_detected: bool = False
-) -> Presence:
-    """Return the presence from the silhouette's area as shares of the frontal model's.
-
-    ``low`` is where the model is largest, ``high`` where it is smallest; a person has ``smallest``
-    to ``largest``. Whom a detector finds may be smaller, and a spoilt silhouette does no harm.
-    """
-    if high < smallest and not (is_detected and high > 0.0):
-        return Presence.NOBODY
-    return Presence.TOO_MUCH if low > largest and not is_detected else Presence.PERSON

@@ -66,8 +66,8 @@ class RatedStates:
         return self.states[kept]
 
 
-# Uniform numbers per torso, per arm, and per state of the last rounds.
-_OF_TORSO, _OF_ARM, _OF_STATE = 2, 3, 2
+# Uniform numbers per arm, and per state.
+_OF_ARM, _OF_STATE = 3, 2
 
 
 class Draws:
@@ -82,13 +82,9 @@ class Draws:
         )
         arms = 2 * self._arms
         normals = (c.torsos + together) * N_STATE + (arms + 2 * self._near) * ARM_ANGLES
-        uniforms = c.torsos * _OF_TORSO + arms * _OF_ARM + together * _OF_STATE
+        uniforms = (c.torsos + together) * _OF_STATE + arms * _OF_ARM
         self._normals = _Numbers(rng.standard_normal(normals))
         self._uniforms = _Numbers(rng.random(uniforms))
-
-    def for_torsos(self, count: int) -> tuple[FloatArray, FloatArray]:
-        """Return normal numbers (count, 14) and uniform ones (count, 2)."""
-        return self._normals.take(count, N_STATE), self._uniforms.take(count, _OF_TORSO)
 
     def for_arms(self) -> tuple[FloatArray, FloatArray]:
         """Return normal numbers (N, 4) and uniform ones (N, 3) for N proposed arms of a side."""

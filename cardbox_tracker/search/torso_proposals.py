@@ -14,20 +14,8 @@ from cardbox_tracker.person.kinematics import (
     side_of,
     state_pose,
 )
-from cardbox_tracker.person.posture import (
-    FIRST_ANGLES,
-    N_STATE,
-    PITCH,
-    TORSO_X,
-    TORSO_Y,
-    YAW,
-)
-from cardbox_tracker.search.joint_moves import (
-    Noise,
-    Numbers,
-    clip_state,
-    pivot,
-)
+from cardbox_tracker.person.posture import FIRST_ANGLES, N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
+from cardbox_tracker.search.joint_moves import Noise, Numbers, clip_state, pivot
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 

@@ -15,11 +15,7 @@ from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.terms.body_outline import (
-    BODY_PATCHES,
-    TRUNK_PATCHES,
-    corners_of_body,
-)
+from cardbox_tracker.terms.body_outline import BODY_PATCHES, TRUNK_PATCHES, corners_of_body
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
 from cardbox_tracker.terms.multi_view import MultiViewCost
 

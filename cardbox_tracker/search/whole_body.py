@@ -116,8 +116,7 @@ class WholeBodyFilter:
         cost.face(float(self._reference[YAW]))
         self._presence = PersonPresence(cost, self._config)
         self._arm = ArmSearch(cost)
-        crosses = self._profile.crosses
-        self._locator = Locator(cost, self._body.placement.distance_m, views, crosses)
+        self._locator = Locator(cost, self._body.placement.distance_m, views)
         self.refine = Refiner(cost, views)
         self._doubt = doubt.Doubt()
         is_measured = self._body.source == MEASURED
@@ -221,13 +220,16 @@ class WholeBodyFilter:
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = profile.fresh_torsos if is_settled else profile.torso_explorers
+        noise = profile.noise()
+        # The arms of a torso keep their angles.
+        noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
         torsos = torso_proposals.propose_torsos(
             self._survivors,
-            (_of_torso(profile.noise()), cost.limits, _lever_m(cost)),
+            (noise, cost.limits, _lever_m(cost)),
             location.step_m,
             profile.torso_explorers,
             (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
-            search.draws.for_torsos(profile.torsos),
+            search.draws.for_states(profile.torsos),
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
@@ -264,7 +266,8 @@ class WholeBodyFilter:
     def fitted(self, search: Search) -> None:
         """Rate states that are fitted to the cues, from the best different ones."""
         rated = self.rated
-        if search.profile.fits_outlines:
+        if self._views:
+            # Several outlines tell more of a posture than one.
             chosen = rated.different(*_OUTLINED)
             near = Prior(chosen, _NEAR)
             rated.add(self.refine(chosen, self._cost.outlines(chosen[0]), near, _OUTLINED_STEPS)[0])
@@ -346,7 +349,7 @@ class WholeBodyFilter:
         veto = veto or (doubt.BACK if is_back else "")
         judged = self._doubt.judge(evidence, source, are_hidden(cost, result), veto)
         self._result = result
-        if profile.keeps_result:
+        if self._views:
             self._survivors[-1] = result  # in place of the worst one
         return Fit(
             posture=result[POSTURE],
@@ -439,12 +442,6 @@ STAGES: tuple[Stage, ...] = (
     WholeBodyFilter.together,
 )
 """The search of a frame: each stage adds rated states to those of the previous ones."""
-
-
-def _of_torso(noise: FloatArray) -> FloatArray:
-    """Return the noise (14,) of a torso, whose arms keep their angles."""
-    noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
-    return noise
 
 
 def _lever_m(cost: MultiViewCost) -> float:

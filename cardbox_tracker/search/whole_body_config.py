@@ -85,11 +85,6 @@ class SearchProfile:
     #: tell where joints are.
     refining_steps: int = 2
     start_passes: int = 3  #: searches in the first silhouette of a person
-    #: whether an upright person is proposed at the intersection of the lines of sight.
-    crosses: bool = False
-    #: whether a few different states are fitted to the outlines before all joints move together.
-    fits_outlines: bool = False
-    keeps_result: bool = False  #: whether the refined result of a frame is among the survivors
     smoothing: float = 1.0  #: factor on the setting ``smoothing``
 
     def noise(self) -> FloatArray:
@@ -124,9 +119,6 @@ SEVERAL_CAMERAS = replace(
     arms_again=120,
     differing=0.8,
     round_decay=0.8,
-    crosses=True,
-    fits_outlines=True,
-    keeps_result=True,
     smoothing=1.0 / 3.0,
 )
 """Several outlines determine a posture better than one, so other steps are efficient: with as few

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
+from cardbox_tracker.segmentation.regions import disk
 from cardbox_tracker.segmentation.scene_motion import SCALE, SMOOTHING_PX, changed_pixels
 
 FloatImage = NDArray[np.float32]
@@ -102,12 +103,12 @@ class StillRegions:
         part of it, so that a head is not separated where the neck has the colour of the wall.
         """
         moves = (self._still < self._blocks).astype(np.uint8)
-        joined = cv2.dilate(self._seen, _disk(_NEAR_PX // SCALE))
+        joined = cv2.dilate(self._seen, disk(_NEAR_PX // SCALE))
         count, labels = cv2.connectedComponents(joined, connectivity=8)
         for number in range(1, count):
             region = ((labels == number) & (self._seen > 0)).astype(np.uint8)
-            near = cv2.dilate(region, _disk(_NEAR_PX // SCALE))
-            outline = near - cv2.erode(region, _disk(_NEAR_PX // 2 // SCALE))
+            near = cv2.dilate(region, disk(_NEAR_PX // SCALE))
+            outline = near - cv2.erode(region, disk(_NEAR_PX // 2 // SCALE))
             yield region > 0, max(cv2.mean(moves, part)[0] for part in (near, outline))
 
 
@@ -153,7 +154,7 @@ class Absorber:
         if self._things is not None:
             things = self._things & found
             if things.any():
-                around = cv2.dilate(things.astype(np.uint8), _disk(_NEAR_PX)) > 0
+                around = cv2.dilate(things.astype(np.uint8), disk(_NEAR_PX)) > 0
                 others = (self._others > 0) & ~things
                 absorbed = around & ~others, self._learner.model()
         self._things = found if found.any() else None
@@ -168,8 +169,3 @@ class Absorber:
             return True
         self._last_ns = stamp_ns or None
         return False
-
-
-def _disk(radius_px: int) -> ImageArray:
-    size = 2 * radius_px + 1
-    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)

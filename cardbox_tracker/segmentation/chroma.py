@@ -142,16 +142,12 @@ class ChromaScore:
         if window is None:
             part, sides = (slice(None), slice(None)), size
         else:
-            _check(window, size, 2)
-            part = (
-                slice(window.top // 2, window.bottom // 2),
-                slice(window.left // 2, window.right // 2),
-            )
+            window.check_within(size, 2)
+            if window.is_empty:
+                raise ValueError(f"{window} is empty; expected pixels")
+            part = Window(*(edge // 2 for edge in window)).slices
             sides = window.bottom - window.top, window.right - window.left
         margin = self._margin(colors[:, *part], self._background[:, *part])
-        height, width = margin.shape
-        if sides == (2 * height, 2 * width):
-            return np.uint8(255) * (_doubled(margin) >= 0.0)
         whole = cv2.resize(margin, (sides[1], sides[0]))
         return np.asarray(cv2.inRange(whole, 0.0, np.inf), np.uint8)
 
@@ -194,20 +190,3 @@ class ChromaScore:
         medians = [np.partition(one, middle, axis=None)[middle] for one in shares]
         red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST)
         self._cast = float(red), float(blue)
-
-
-def _check(window: Window, shape: tuple[int, ...], unit: int) -> None:
-    """Refuse a window that is empty, or not at even rows and columns in steps of ``unit`` px."""
-    window.check_within(shape, unit)
-    if window.is_empty or window.top % 2 or window.bottom % 2:
-        raise ValueError(f"{window} is empty or has odd edges; expected neither")
-
-
-def _doubled(margin: FloatImage) -> FloatImage:
-    """Return an image (h, w) at twice the resolution, (2 h, 2 w), interpolated linearly."""
-    near, far = np.float32(0.75), np.float32(0.25)
-    for _ in range(2):
-        padded = np.pad(margin, ((1, 1), (0, 0)), "edge")
-        pairs = [near * margin + far * beside for beside in (padded[:-2], padded[2:])]
-        margin = np.stack(pairs, axis=1).reshape(-1, margin.shape[1]).T
-    return margin

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.segmentation.chroma import ChromaModel
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
+from cardbox_tracker.segmentation.regions import disk
 from cardbox_tracker.segmentation.scene_motion import changed_pixels
 
 Mask = NDArray[np.bool_]
@@ -90,7 +91,7 @@ def bodies(moved: Mask) -> Mask:
     image = moved.astype(np.uint8)
     _, regions, statistics, _ = cv2.connectedComponentsWithStats(image, connectivity=8)
     image[(statistics[:, cv2.CC_STAT_AREA] < _LEAST * moved.size)[regions]] = 0
-    near = cv2.dilate(image, _disk(_MARGIN * width))
+    near = cv2.dilate(image, disk(_MARGIN * width))
     labels, regions = cv2.connectedComponents(near, connectivity=8)
     result = np.zeros(moved.shape, np.uint8)
     for label in range(1, labels):
@@ -100,7 +101,7 @@ def bodies(moved: Mask) -> Mask:
             below = points.copy()
             below[:, 1] = height - 1
             cv2.fillConvexPoly(result, cv2.convexHull(np.concatenate([points, below])), 1)
-    return np.asarray(cv2.dilate(result, _disk(_MARGIN * width)) > 0, np.bool_)
+    return np.asarray(cv2.dilate(result, disk(_MARGIN * width)) > 0, np.bool_)
 
 
 def _touching(mask: Mask, body: Mask) -> Mask:
@@ -109,11 +110,6 @@ def _touching(mask: Mask, body: Mask) -> Mask:
     touching = np.zeros(labels, np.bool_)
     touching[np.unique(regions[body])] = True
     return np.asarray(mask & touching[regions], np.bool_)
-
-
-def _disk(radius_px: float) -> NDArray[np.uint8]:
-    size = 2 * max(round(radius_px), 1) + 1
-    return np.asarray(cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (size, size)), np.uint8)
 
 
 def _resized(mask: Mask, size: tuple[int, ...]) -> Mask:

@@ -40,10 +40,10 @@ class Window(NamedTuple):
         """Raise ValueError unless it is in an image of ``shape`` and in steps of ``unit`` px."""
         top, bottom, left, right = self
         is_inside = 0 <= top <= bottom <= shape[0] and 0 <= left <= right <= shape[1]
-        if not is_inside or left % unit or right % unit:
+        if not is_inside or any(edge % unit for edge in self):
             raise ValueError(
                 f"{self} does not fit an image of the shape {shape}; expected a part of it whose "
-                f"columns are multiples of {unit}"
+                f"edges are multiples of {unit}"
             )
 
     def joined(self, other: Window) -> Window:

@@ -40,13 +40,7 @@ from cardbox_tracker.person.parts import (
     UPPER_ARM,
     WAIST,
 )
-from cardbox_tracker.terms.kernel_arguments import (
-    BodyTuple,
-    Drawn,
-    Floats,
-    Intrinsics,
-    body_of,
-)
+from cardbox_tracker.terms.kernel_arguments import BodyTuple, Drawn, Floats, Intrinsics, body_of
 
 DepthMap = NDArray[np.float32]
 

@@ -42,14 +42,7 @@ from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms import inner_cue_kernels as kernels
 from cardbox_tracker.terms.inner_cue_kernels import costs_of_arms, ratio_maps
-from cardbox_tracker.terms.term import (
-    Frame,
-    Image,
-    Posed,
-    Silhouette,
-    Term,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import Frame, Image, Posed, Silhouette, Term, TermObservation
 
 # Weight of a nat over the area of a forearm; neighbouring pixels and successive images are alike.
 _WEIGHT = 0.1

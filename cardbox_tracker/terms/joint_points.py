@@ -43,13 +43,7 @@ from cardbox_tracker.terms.joint_points_kernels import (
     WRIST,
     EvidenceTuple,
 )
-from cardbox_tracker.terms.term import (
-    ARMS,
-    Frame,
-    Posed,
-    Term,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARMS, Frame, Posed, Term, TermObservation
 
 # Deviation of a point, m and px; speed of the joint, m/s, which makes older points uncertain.
 _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}

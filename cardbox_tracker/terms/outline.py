@@ -30,11 +30,7 @@ from cardbox_tracker.terms.body_outline import (
     new_scratch,
     place_patches,
 )
-from cardbox_tracker.terms.distance_field import (
-    FAR,
-    padded_width,
-    signed_distances_of,
-)
+from cardbox_tracker.terms.distance_field import FAR, padded_width, signed_distances_of
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 from cardbox_tracker.terms.outline_distances import ABOVE_HIPS_PX, HALF_PX, comparing
 from cardbox_tracker.terms.outline_points import (

@@ -14,12 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from cardbox_tracker.camera.rasterisation import (
-    CROSSING_BITS,
-    FARTHEST_PX,
-    NEAR_PLANE_M,
-    SUBPIXELS,
-)
+from cardbox_tracker.camera.rasterisation import CROSSING_BITS, FARTHEST_PX, NEAR_PLANE_M, SUBPIXELS
 from cardbox_tracker.common.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
 from cardbox_tracker.terms.kernel_arguments import Counts, Floats, Intrinsics, Whole
 

@@ -32,20 +32,9 @@ from cardbox_tracker.person.kinematics import (
 )
 from cardbox_tracker.terms.bit_masks import Masks, cover_masks, new_masks, sum_masks
 from cardbox_tracker.terms.bit_planes import Planes
-from cardbox_tracker.terms.body_outline import (
-    ARM_PATCHES,
-    TRUNK_PATCHES,
-    place_arm,
-    place_trunk,
-)
+from cardbox_tracker.terms.body_outline import ARM_PATCHES, TRUNK_PATCHES, place_arm, place_trunk
 from cardbox_tracker.terms.body_priors import Prior, PriorTuple, arm_prior, torso_prior
-from cardbox_tracker.terms.kernel_arguments import (
-    Body,
-    BodyTuple,
-    Drawn,
-    Floats,
-    body_of,
-)
+from cardbox_tracker.terms.kernel_arguments import Body, BodyTuple, Drawn, Floats, body_of
 from cardbox_tracker.terms.rasterisation import Workspace, draw, new_workspace
 
 

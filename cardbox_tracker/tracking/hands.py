@@ -320,14 +320,11 @@ def _ray(px: FloatArray, camera: Camera) -> FloatArray:
 
 def _ray_rotation(px: FloatArray, camera: Camera) -> FloatArray:
     """Return the least rotation (3, 3) that turns the camera's axis to the ray of a pixel."""
-    rotation, _ = cv2.Rodrigues(_turn_to(_unit(_ray(px, camera))))
-    return np.asarray(rotation, np.float64)
-
-
-def _turn_to(ray: FloatArray) -> FloatArray:
+    ray = _unit(_ray(px, camera))
     across = np.array([-ray[1], ray[0], 0.0])
     sine = float(np.linalg.norm(across))
-    return across * (float(np.arctan2(sine, ray[2])) / sine if sine > 0.0 else 0.0)
+    turn = across * (float(np.arctan2(sine, ray[2])) / sine if sine > 0.0 else 0.0)
+    return np.asarray(cv2.Rodrigues(turn)[0], np.float64)
 
 
 def _unit(vector: FloatArray) -> FloatArray:

@@ -42,38 +42,6 @@ from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import KEPT_S, Estimate
 
-_MOST_KEPT = 0.5
-"""Share of the last output that delays a ramp by one interval."""
-
-
-class LowPass:
-    """First-order low-pass filter (exponential smoothing) over time.
-
-    The output is y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2, for
-    inputs x at intervals dt. A ramp is delayed by dt a / (1 - a): slightly less than the time
-    constant, and never more than one interval.
-    """
-
-    def __init__(self, time_constant_s: float) -> None:
-        """Begin without a value; with a time constant of 0 the output is the input."""
-        self._time_constant_s = time_constant_s
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget the last output; the next output is the input."""
-        self._last: FloatArray | None = None
-
-    def __call__(self, values: FloatArray, interval_s: float) -> FloatArray:
-        """Return the filtered values, of any shape, ``interval_s`` after the previous ones."""
-        if self._time_constant_s == 0.0:
-            return values
-        if self._last is not None:
-            kept = min(exp(-max(interval_s, 0.0) / self._time_constant_s), _MOST_KEPT)
-            values = kept * self._last + (1.0 - kept) * values
-        self._last = values
-        return values
-
-
 FACE_POINTS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
 FACE_M: FloatArray = np.array(
     [
@@ -115,7 +83,9 @@ _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
 _RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
-_SMOOTHING_S = 0.15
+# Time constant, s, and the largest weight of the last output of exponential smoothing: a ramp comes
+# later by less than that constant, and never by more than one interval.
+_SMOOTHING_S, _MOST_KEPT = 0.15, 0.5
 _DRIFT_RAD_S = 1.0
 
 
@@ -220,7 +190,6 @@ class HeadTracker:
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Start without a direction; the working camera has the pitch of the body model."""
         self._body, self._camera = body, camera
-        self._smooth = LowPass(_SMOOTHING_S)
         self._last: Neck | None = None
         self._age_s = 0.0
 
@@ -228,12 +197,14 @@ class HeadTracker:
         """Return ``found``, the estimate of a frame, with the angles of the neck if known."""
         self._age_s += frame.interval_s
         if self._age_s > KEPT_S:
-            self._smooth.forget()
             self._last = None
         neck = self._fit(frame.points, found)
         if neck is not None:
-            angles = self._smooth(neck.angles, self._age_s)
-            self._last, self._age_s = Neck(angles, neck.stddev), 0.0
+            if self._last is not None:
+                kept = min(exp(-self._age_s / _SMOOTHING_S), _MOST_KEPT)
+                angles = kept * self._last.angles + (1.0 - kept) * neck.angles
+                neck = neck._replace(angles=angles)
+            self._last, self._age_s = neck, 0.0
         if self._last is None or found.posture is None:
             return found
         stddev = np.hypot(self._last.stddev, _DRIFT_RAD_S * self._age_s)

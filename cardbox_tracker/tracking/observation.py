@@ -46,11 +46,6 @@ def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
     return pixels.astype(np.float64)
 
 
-def people_from(given: Any, name: str, size: tuple[int, int]) -> tuple[ImagePoints, ...]:
-    """Return a detector's points of several people, or raise ValueError."""
-    return tuple(points_from(one, name, size) for one in given)
-
-
 def _upright_points(view: View, found: ImagePoints) -> ImagePoints:
     return replace(found, px=view.upright_px(found.px))
 
@@ -62,7 +57,8 @@ CHANNELS: dict[str, Channel] = {
     "depth_m": Channel(depth_from, View.upright),
     "points": Channel(points_from, _upright_points),
     "people": Channel(
-        people_from, lambda view, found: tuple(_upright_points(view, one) for one in found)
+        lambda given, name, size: tuple(points_from(one, name, size) for one in given),
+        lambda view, found: tuple(_upright_points(view, one) for one in found),
     ),
 }
 """The channels by name. A line ``CHANNELS["name"] = Channel(pixels_from, View.upright_px)`` adds

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, Future
 from copy import copy
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain, combinations, repeat
 from typing import NamedTuple
 
@@ -105,16 +105,16 @@ class _Share(NamedTuple):
     is_detected: bool  #: whether a detector finds the figures
 
 
+@dataclass
 class _Sight:
     """What is known of a person in the images of one camera."""
 
-    def __init__(self) -> None:
-        self.figure: Figure | None = None
-        self.points: ImagePoints | None = None
-        self.pixels: Silhouette | None = None
-        self.colours: FloatArray | None = None
-        self.learned = 0
-        self.seen_ns: int | None = None
+    figure: Figure | None = None
+    points: ImagePoints | None = None
+    pixels: Silhouette | None = None
+    colours: FloatArray | None = None
+    learned: int = 0
+    seen_ns: int | None = None
 
 
 class _Person:
@@ -220,16 +220,21 @@ class Session:
 
         Raises what a tracker does, and ValueError if there is no body, or another number of people.
         """
-        known, others = (
-            all_of_kind("bodies", bodies, BodyModel),
-            all_of_kind("others", others, OtherCamera),
-        )
+        known = all_of_kind("bodies", bodies, BodyModel)
+        others = all_of_kind("others", others, OtherCamera)
         if not known:
             raise ValueError("bodies are empty; expected the body of each person, or one for all")
         for name, number in (("people", people), ("only", only)):
             if number is not None and not 0 <= of_kind(name, number, int) <= MOST_PEOPLE:
                 raise ValueError(f"{name} is {number}; expected a number up to {MOST_PEOPLE}")
-        self._bodies = tuple(_before_all(body, others) for body in known)
+        meeting = meeting_m([other.extrinsics for other in others])
+        # All cameras look at a body at an unknown distance.
+        self._bodies = tuple(
+            body.with_values(distance_m=meeting)
+            if meeting is not None and "distance_m" in body.unknown
+            else body
+            for body in known
+        )
         self._camera = of_kind("camera", camera, Camera)
         self.config = settings_or(default_preset(), config)
         self._rng, self._others = settings_or(np.random.default_rng(0), rng, "rng"), others
@@ -400,8 +405,7 @@ class Session:
         """Forget all places, so that people are known by their colours alone."""
         assert self._last_ns is not None
         for person in self._people:
-            person.tracker.reset()
-            person.estimate = Estimate(NO_PERSON, person=person.estimate.person)
+            self.reset(person.number)
             for sight in person.sights:
                 sight.points = sight.pixels = None
                 if sight.seen_ns is not None:
@@ -507,10 +511,8 @@ class Session:
                 continue
             if sight.figure is None or one.figure is None:
                 continue
-            here, there = (
-                self._sight_line(camera, one.figure),
-                self._sight_line(number, sight.figure),
-            )
+            here = self._sight_line(camera, one.figure)
+            there = self._sight_line(number, sight.figure)
             ahead = np.column_stack([here[1], -there[1]])
             between = there[0] - here[0]
             depths_m = np.linalg.lstsq(ahead, between, rcond=None)[0]
@@ -562,7 +564,7 @@ class Session:
         sizes = [np.count_nonzero(shown[number].pixels) for number in free]
         largest = sorted(free, key=lambda number: -sizes[free.index(number)])[:room]
         added = {}
-        for number in sorted(largest, key=lambda number: _middle(shown[number].pixels)):
+        for number in sorted(largest, key=lambda one: np.nonzero(shown[one].pixels)[1].mean()):
             person = waiting.pop(0) if waiting else self._add(len(self._people) + 1)
             person.sights[camera].colours = colours[number]
             added[person.number] = number
@@ -692,14 +694,6 @@ class Session:
         return found
 
 
-def _before_all(body: BodyModel, others: Sequence[OtherCamera]) -> BodyModel:
-    """Return a body at an unknown distance where all cameras, which look at it, may see it."""
-    distance_m = meeting_m([other.extrinsics for other in others])
-    if distance_m is None or "distance_m" not in body.unknown:
-        return body
-    return body.with_values(distance_m=distance_m)
-
-
 def _held(last: Estimate, hidden: bool = False) -> Estimate:
     """Return the last estimate for an image that does not show the person, or not well."""
     if last.posture is None:
@@ -726,11 +720,6 @@ def _figures(points: Sequence[ImagePoints], shape: tuple[int, ...]) -> list[Show
 def _share(pixels: Silhouette, of: Silhouette) -> float:
     """Return the share of the pixels (H, W) that are not 0 in ``of``."""
     return cv2.countNonZero(pixels & of) / max(cv2.countNonZero(pixels), 1)
-
-
-def _middle(pixels: Silhouette) -> float:
-    """Return the mean column of pixels that are not 0."""
-    return float(np.nonzero(pixels)[1].mean())
 
 
 def _colours_of(one: Shown, image: Image | None, silhouette: Silhouette) -> FloatArray | None:

@@ -203,14 +203,6 @@ class Tracker:
         found = *self.faults.remarks(names, is_all), *depths, self.place.contradiction
         return [text for text in found if text]
 
-    def used_texts(self) -> dict[str, str]:
-        """Return for the diagnostics in how many images each optional input was used."""
-        return {f"{name} used": f"{count} of {self.images}" for name, count in self.used.items()}
-
-    def camera_ious(self) -> list[float | None]:
-        """Return the IoU of the last estimate in each camera; None in one without a person."""
-        return self._filter.ious()
-
     def track(
         self,
         observations: Observations | Observation | Silhouette,

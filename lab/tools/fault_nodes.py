@@ -14,11 +14,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-    stamp_ns,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message, stamp_ns
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_inputs import ObservationSet
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode

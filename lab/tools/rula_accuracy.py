@@ -45,12 +45,7 @@ from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.angles import comparable, true_postures
 from lab.evaluation.people import torso_angles
 from lab.evaluation.session import RecordedSession, load_session
-from lab.evaluation.tracking import (
-    ALL_INPUTS,
-    DETECTOR,
-    InputSelection,
-    track_session,
-)
+from lab.evaluation.tracking import ALL_INPUTS, DETECTOR, InputSelection, track_session
 from lab.pages import replaced, row, table
 
 DOCUMENT = Path(__file__).resolve().parents[2] / "docs" / "ergonomics.md"

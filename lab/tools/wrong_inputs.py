@@ -25,11 +25,7 @@ from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 from lab.evaluation.session import RecordedSession, load_session
-from lab.evaluation.tracking import (
-    InputSelection,
-    person_of,
-    track_session,
-)
+from lab.evaluation.tracking import InputSelection, person_of, track_session
 
 CASES = {
     "nothing": (1.0, 1.0, 0.0),

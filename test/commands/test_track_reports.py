@@ -18,11 +18,7 @@ from matplotlib.figure import Figure
 
 from cardbox_tracker.applications.demo.film import DemoFilm
 from cardbox_tracker.applications.exporting.motion import Motion
-from cardbox_tracker.applications.reporting.page import (
-    angles_of,
-    page_figure,
-    space_view,
-)
+from cardbox_tracker.applications.reporting.page import angles_of, page_figure, space_view
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.measuring.scene import Value
 from cardbox_tracker.person.model import BodyModel

@@ -54,7 +54,7 @@ class Sample:
 def test_settings_are_found_in_order_and_plain_fields_are_none() -> None:
     found = settings.settings_of(Sample)
     assert list(found) == ["ratio", "kind", "limit"]
-    assert found["ratio"] == Setting("a ratio", "m", 0.0, 1.0, (), True)
+    assert found["ratio"] == Setting("a ratio", "m", (0.0, 1.0), (), True)
     assert [one.range_text for one in found.values()] == ["0 to 1", "a | b", "0 to 10"]
     assert Setting("any").range_text == ""
 

@@ -142,6 +142,7 @@ def test_a_table_of_a_spreadsheet_may_have_decimal_commas(tmp_path: Path, betwee
         (HEADER, "5,nose,nan,3,0.9", None, r"line 2: nose is at .*nan.* score 0 if the point is"),
         (HEADER, "5,nose,1,3,nan", None, "line 2: nose has the score nan"),
         (HEADER, "5,nose,1,3,87", None, "line 2: nose has the score 87; expected a chance"),
+        (HEADER, f"5,{5000 * 'x'},1,3,87", None, r"line 2: x{9,999}\.\.\. has the score 87"),
         (HEADER, "5,left_knee,1,3000,0.9", None, "line 2: left_knee is at .*image of 640x480 px"),
         (HEADER, "5,nose,1,2,1\n5,nose,2,2,1", None, "line 3: stamp_ns 5 has nose again"),
         (

@@ -14,12 +14,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors import pose_network
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.detectors.model_files import installed_models
-from cardbox_tracker.detectors.pose_network import (
-    LANDMARKS,
-    Detection,
-    PoseNetwork,
-    Square,
-)
+from cardbox_tracker.detectors.pose_network import LANDMARKS, Detection, PoseNetwork, Square
 
 
 def test_a_square_that_is_not_turned_keeps_the_axes_of_the_image() -> None:

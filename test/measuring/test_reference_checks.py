@@ -14,9 +14,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.measuring.asked_outline import check_asked
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.reference_checks import (
-    check_postures,
-)
+from cardbox_tracker.measuring.reference_checks import check_postures
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, SIDE_TURNS, reference_posture

@@ -11,12 +11,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.skeleton import Skeleton
-from cardbox_tracker.measuring.stature import (
-    CROWN_TO_SHOULDER,
-    SPAN,
-    height_of_row_m,
-    stature_m,
-)
+from cardbox_tracker.measuring.stature import CROWN_TO_SHOULDER, SPAN, height_of_row_m, stature_m
 
 CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
 # 3.3 px a centimetre at 1 m, so 1 px is a centimetre at 3.3 m.

@@ -12,11 +12,7 @@ from cardbox_tracker.person.legs import leg_angles, leg_directions
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.proportions import HIP_SHARE, SHANK_SHARE, THIGH_SHARE, stature_of
-from cardbox_tracker.person.skeleton import (
-    LEG_NAMES,
-    Group,
-    names_of,
-)
+from cardbox_tracker.person.skeleton import LEG_NAMES, Group, names_of
 from cardbox_tracker.person.urdf import LinkTransforms, urdf_from_body
 
 BODY = BodyModel()

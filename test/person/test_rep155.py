@@ -21,10 +21,7 @@ from cardbox_tracker.person.posture import (
     place_limits,
     reference_posture,
 )
-from cardbox_tracker.person.rep155 import (
-    Rep155Joints,
-    joint_names,
-)
+from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.person.skeleton import POSTURE_GROUPS, joints_of, neck_rotation
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate

@@ -9,10 +9,7 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.applications.simulation.session import SessionFormat, synthesize_session
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import initialize_from_recording

@@ -12,14 +12,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.track import Quality
 from cardbox_tracker.search.doubt import Doubt, Source
-from cardbox_tracker.tracking.estimate import (
-    LOST,
-    NO_PERSON,
-    TRACKING,
-    UNCERTAIN,
-    Estimate,
-    Place,
-)
+from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate, Place
 
 SURE, UNSURE = KeypointState.TRACKED, KeypointState.UNCERTAIN
 BODY = BodyModel()

@@ -26,11 +26,7 @@ from cardbox_tracker.recordings.result_table import (
     RATE_COLUMNS,
     SMOOTHED,
 )
-from cardbox_tracker.recordings.smoothing import (
-    butterworth,
-    low_passed,
-    rates_of,
-)
+from cardbox_tracker.recordings.smoothing import butterworth, low_passed, rates_of
 from cardbox_tracker.tracking.estimate import FILLED
 
 RATE_HZ = 30.0

@@ -119,7 +119,7 @@ def turned(shaken: Path) -> Turned:
 def test_points_of_turned_images_are_those_of_a_still_camera(shaken: Path, turned: Turned) -> None:
     asked = request(shaken)
     assert turned.found.unknown == 0 and "turns by up to" in turned.remark
-    with asked.turned_back(turned).open() as source:
+    with replace(asked, turned=turned).open() as source:
         camera, frames = source.first.camera, [taken.first for taken in source.frames()]
         pictures = [taken.picture().shape for taken in source.frames() if taken.picture]
     assert camera.fx == pytest.approx(CAMERA.fx, rel=0.02)
@@ -142,7 +142,7 @@ def test_a_detector_sees_the_images_as_they_were_recorded(shaken: Path, turned: 
             return super().detect(image)
 
     finds = Detector(OwnModel.of(Looks, "Looks"))
-    asked = replace(request(shaken), silhouettes=finds, points=finds).turned_back(turned)
+    asked = replace(request(shaken), silhouettes=finds, points=finds, turned=turned)
     with asked.open() as source:
         masks = [taken.first.silhouette.shape for taken in source.frames()]
         assert {*masks} == {(source.first.camera.height, source.first.camera.width)}

@@ -33,10 +33,7 @@ from cardbox_tracker.segmentation.background import SilhouetteExtractor, segment
 from cardbox_tracker.segmentation.chroma import ChromaModel, ChromaScore
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LightFollower
-from cardbox_tracker.segmentation.regions import (
-    clean_silhouette,
-    find_regions,
-)
+from cardbox_tracker.segmentation.regions import clean_silhouette, find_regions
 from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window, window_of
 from cardbox_tracker.terms.compiled import CompiledSilhouette

@@ -24,13 +24,7 @@ from cardbox_tracker.search.config import TrackerConfig, paper_preset
 from cardbox_tracker.search.hierarchy import HierarchicalFilter, SumOfTerms
 from cardbox_tracker.terms.compiled import CompiledSilhouette
 from cardbox_tracker.terms.kernel_arguments import body_tuple
-from cardbox_tracker.terms.term import (
-    ARMS,
-    ArmCosts,
-    Posed,
-    TermObservation,
-    TorsoCosts,
-)
+from cardbox_tracker.terms.term import ARMS, ArmCosts, Posed, TermObservation, TorsoCosts
 
 CAMERA = Camera(96, 72, 99.0, 99.0, 47.5, 35.5)
 BODY = BodyModel.of(hip_height_m=-0.51)

@@ -15,20 +15,9 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.least_squares import Residuals
-from cardbox_tracker.detectors.image_points import (
-    POINT_INDEX,
-    POINT_NAMES,
-    ImagePoints,
-    LegPoints,
-)
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints, LegPoints
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import (
-    PITCH,
-    TORSO_X,
-    TORSO_Z,
-    reference_posture,
-    state_limits,
-)
+from cardbox_tracker.person.posture import PITCH, TORSO_X, TORSO_Z, reference_posture, state_limits
 from cardbox_tracker.search.arm_search import ARM_LIMITS
 from cardbox_tracker.search.mirroring import mirrored_states
 from cardbox_tracker.search.refiner import Cue, Prior, Refiner

@@ -10,12 +10,7 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.search.config import FilterConfig
 from cardbox_tracker.search.particle_filter import ParticleFilter
-from cardbox_tracker.search.resampling import (
-    SCHEMES,
-    STRATEGIES,
-    gaussian_weights,
-    resample,
-)
+from cardbox_tracker.search.resampling import SCHEMES, STRATEGIES, gaussian_weights, resample
 
 SIGMA_PX = 1000.0
 

@@ -17,10 +17,7 @@ from cardbox_tracker.detectors.pose_network import LANDMARKS, NOBODY, Detection
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model_file import save_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.messages.keypoints import people_message
 from cardbox_tracker.ros.nodes.detector_node import DetectorNode
 from cardbox_tracker.ros.runtime import qos

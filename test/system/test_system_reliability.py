@@ -28,10 +28,7 @@ from std_srvs.srv import Trigger
 from cardbox_tracker.person.model_file import dumps_body_model, save_body_model
 from cardbox_tracker.person.skeleton import PLACE_NAMES
 from cardbox_tracker.recordings.outputs import joints_of
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.tracker import Tracker

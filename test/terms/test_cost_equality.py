@@ -10,13 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.camera.rasterisation import (
-    NEAR_PLANE_M,
-    clip_near,
-    fill_convex,
-    render,
-    snap,
-)
+from cardbox_tracker.camera.rasterisation import NEAR_PLANE_M, clip_near, fill_convex, render, snap
 from cardbox_tracker.person import parts as indices
 from cardbox_tracker.person.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
 from cardbox_tracker.person.model import BodyModel

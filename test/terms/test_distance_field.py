@@ -8,11 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from cardbox_tracker.terms.distance_field import (
-    FAR,
-    padded_width,
-    signed_distances_of,
-)
+from cardbox_tracker.terms.distance_field import FAR, padded_width, signed_distances_of
 
 
 def padded(mask: NDArray[np.uint8]) -> NDArray[np.float32]:

@@ -29,14 +29,7 @@ from cardbox_tracker.terms.inner_cue import (
     zones_of,
 )
 from cardbox_tracker.terms.kernel_arguments import body_tuple
-from cardbox_tracker.terms.term import (
-    ARM,
-    ARMS,
-    TRUNK,
-    Frame,
-    Posed,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARM, ARMS, TRUNK, Frame, Posed, TermObservation
 from cardbox_tracker.tracking.tracker import Tracker
 
 SHIRT, SKIN, TROUSERS, WALL = (150, 60, 30), (110, 150, 210), (40, 40, 40), (128, 128, 128)

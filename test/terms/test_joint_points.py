@@ -13,12 +13,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.detectors.image_points import (
-    POINT_INDEX,
-    POINT_NAMES,
-    ImagePoints,
-    LegPoints,
-)
+from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints, LegPoints
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits

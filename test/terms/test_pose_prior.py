@@ -12,12 +12,7 @@ from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms import pose_prior
-from cardbox_tracker.terms.pose_prior import (
-    FLOOR_NATS,
-    load_gmm,
-    nats_of,
-    sample_bank,
-)
+from cardbox_tracker.terms.pose_prior import FLOOR_NATS, load_gmm, nats_of, sample_bank
 
 
 def slow_nats(vectors: np.ndarray) -> np.ndarray:

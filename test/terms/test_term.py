@@ -9,14 +9,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.terms.kernel_arguments import body_tuple
-from cardbox_tracker.terms.term import (
-    ARM,
-    TRUNK,
-    WHOLE,
-    Frame,
-    Posed,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARM, TRUNK, WHOLE, Frame, Posed, TermObservation
 
 PITCH = 0.2
 CAMERA = Camera(320, 240, 300.0, 310.0, 159.5, 119.5, PITCH)

@@ -17,11 +17,7 @@ from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.measuring.measure import initialize_body
 from cardbox_tracker.measuring.references import average_silhouette
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.recordings.truth import (
-    GroundTruth,
-    load_ground_truth,
-    tracking_error,
-)
+from cardbox_tracker.recordings.truth import GroundTruth, load_ground_truth, tracking_error
 from cardbox_tracker.search.config import TrackerConfig, default_preset, paper_preset
 from cardbox_tracker.tracking.tracker import Tracker
 

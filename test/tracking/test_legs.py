@@ -22,11 +22,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y
 from cardbox_tracker.person.proportions import HIP_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import (
-    LEG_LIMITS,
-    KeypointState,
-    rotation_z,
-)
+from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
 from cardbox_tracker.tracking.leg_fit import points_of

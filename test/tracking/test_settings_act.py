@@ -188,7 +188,7 @@ def test_several_cameras_have_constants_of_their_own_unless_some_are_given() -> 
 def test_a_given_profile_is_that_of_the_search() -> None:
     preset = PRESETS["default"]()
     counts = []
-    for profile in (ONE_CAMERA, replace(ONE_CAMERA, rounds=0, fits_outlines=False)):
+    for profile in (ONE_CAMERA, replace(ONE_CAMERA, rounds=0)):
         config = replace(preset, whole_body=replace(preset.whole_body, profile=profile))
         tracker = Tracker(body(), CAMERA, config, np.random.default_rng(0))
         for image, silhouette, _ in scenes()[:3]:

@@ -15,12 +15,7 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.errors import CameraError, InitializationError
 from cardbox_tracker.common.settings import Settings
 from cardbox_tracker.detectors.image_points import POINT_INDEX, ImagePoints
-from cardbox_tracker.measuring.scale import (
-    DepthReference,
-    depth_scale,
-    measured_scale,
-    scaled,
-)
+from cardbox_tracker.measuring.scale import DepthReference, depth_scale, measured_scale, scaled
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.arm_search import ARM_LIMITS
@@ -29,13 +24,7 @@ from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.search.whole_body_config import SEVERAL_CAMERAS
 from cardbox_tracker.terms.depth import Depth, DepthTerm
 from cardbox_tracker.terms.multi_view import MultiViewCost
-from cardbox_tracker.terms.term import (
-    ARM,
-    TRUNK,
-    Frame,
-    Posed,
-    TermObservation,
-)
+from cardbox_tracker.terms.term import ARM, TRUNK, Frame, Posed, TermObservation
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, UNCERTAIN, Estimate
@@ -215,7 +204,7 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
         estimate = track(tracker, state, seeing)
         errors.append(error_cm(estimate, state))
         states.append(estimate.state)
-        ious = tracker.camera_ious()
+        ious = tracker.filter.ious()
         assert [n for n, iou in enumerate(ious) if iou is not None] == list(seeing)
         if len(seeing) == 1:
             assert ious[seeing[0]] == pytest.approx(estimate.iou)
@@ -226,7 +215,7 @@ def test_two_cameras_follow_and_any_of_them_may_drop_out() -> None:
     assert np.mean([errors[i] for i in (5, 6, 7, 14, 15, 22, 23)]) < 5.0
     assert max(errors[4:]) < 20.0
     assert track(tracker, state_of(0.0), ()).state == NO_PERSON
-    assert tracker.camera_ious() == [None, None]
+    assert tracker.filter.ious() == [None, None]
 
 
 def test_a_second_camera_that_froze_is_not_used() -> None:
@@ -238,12 +227,11 @@ def test_a_second_camera_that_froze_is_not_used() -> None:
         first, second = both(state)[0], both(state_of(min(i, 6) / 5.0, 0.03 * min(i, 6)))[1]
         estimate = tracker.track([Observation(first), Observation(second)])
         if i > 9:
-            assert tracker.camera_ious()[1] is None
+            assert tracker.filter.ious()[1] is None
             errors.append(error_cm(estimate, state))
     assert max(errors) < 20.0
     assert any("camera 2 of 2 shows the same image" in text for text in tracker.remarks())
     assert tracker.images == 20 and 6 <= tracker.used["camera 2"] <= 10
-    assert tracker.used_texts()["camera 2 used"] == f"{tracker.used['camera 2']} of 20"
 
 
 def test_what_told_of_a_posture_is_counted() -> None:
@@ -272,7 +260,7 @@ def test_one_camera_is_a_list_of_one() -> None:
         keypoints = [found.keypoints_m for found in estimates if found.keypoints_m is not None]
         assert len({each.tobytes() for each in keypoints}) == 1
         assert len(keypoints) == 3
-        assert trackers[0].camera_ious() == [pytest.approx(estimates[0].iou)]
+        assert trackers[0].filter.ious() == [pytest.approx(estimates[0].iou)]
 
 
 def test_the_stamp_of_a_time_is_that_of_the_first_camera_or_the_earliest() -> None:

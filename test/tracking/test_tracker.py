@@ -26,12 +26,7 @@ from cardbox_tracker.person.posture import (
     state_limits,
 )
 from cardbox_tracker.person.skeleton import KeypointState, neck_rotation
-from cardbox_tracker.search.config import (
-    FilterConfig,
-    TrackerConfig,
-    default_preset,
-    paper_preset,
-)
+from cardbox_tracker.search.config import FilterConfig, TrackerConfig, default_preset, paper_preset
 from cardbox_tracker.search.doubt import HANDS, Source, models
 from cardbox_tracker.search.hierarchy import Cycles
 from cardbox_tracker.terms.compiled import CompiledObservation, CompiledSilhouette

@@ -36,12 +36,7 @@ from cardbox_tracker.person.skeleton import POSTURE_GROUPS, Group, joints_of
 from cardbox_tracker.recordings import result_reader
 from cardbox_tracker.recordings.result_reader import Results
 from cardbox_tracker.recordings.result_table import RATE_COLUMNS, units
-from cardbox_tracker.recordings.smoothing import (
-    LONGEST_GAP_S,
-    AnyResults,
-    low_passed,
-    rates_of,
-)
+from cardbox_tracker.recordings.smoothing import LONGEST_GAP_S, AnyResults, low_passed, rates_of
 from cardbox_tracker.tracking.estimate import FILLED, UNCERTAIN
 
 NUMBER = "{n}"

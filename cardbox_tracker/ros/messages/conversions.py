@@ -131,8 +131,7 @@ def camera_info_message(
     header: Header, camera: Camera, source: CameraInfo | None = None
 ) -> CameraInfo:
     """Return a pinhole camera's CameraInfo, with R and the baseline in P of ``source``."""
-    k = camera.k.ravel().tolist()
-    message = _info(header, camera.width, camera.height, "plumb_bob", [0.0] * 5, k)
+    message = _info(header, camera, "plumb_bob", np.zeros(5))
     if source is not None:
         r, p = ([float(value) for value in values] for values in (source.r, source.p))
         if np.isfinite(r).all() and any(r):
@@ -155,29 +154,21 @@ def depth_camera_of(message: CameraInfo) -> Camera | None:
 
 def calibration_message(header: Header, calibration: Calibration) -> CameraInfo:
     """Return the CameraInfo of a real camera, as its driver publishes it."""
-    return _info(
-        header,
-        calibration.width,
-        calibration.height,
-        calibration.distortion_model,
-        [float(value) for value in calibration.distortion],
-        [float(value) for value in calibration.k.ravel()],
-    )
+    return _info(header, calibration, calibration.distortion_model, calibration.distortion)
 
 
 def _info(
-    header: Header, width: int, height: int, model: str, d: list[float], k: list[float]
+    header: Header, lens: Camera | Calibration, model: str, distortion: NDArray[np.float64]
 ) -> CameraInfo:
-    projection = [k[0], k[1], k[2], 0.0, k[3], k[4], k[5], 0.0, k[6], k[7], k[8], 0.0]
     return CameraInfo(
         header=header,
-        width=width,
-        height=height,
+        width=lens.width,
+        height=lens.height,
         distortion_model=model,
-        d=d,
-        k=k,
-        r=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
-        p=projection,
+        d=np.asarray(distortion, float).tolist(),
+        k=np.asarray(lens.k, float).ravel(),
+        r=np.eye(3).ravel(),
+        p=np.insert(np.asarray(lens.k, float), 3, 0.0, axis=1).ravel(),
     )
 
 

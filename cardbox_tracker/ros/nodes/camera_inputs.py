@@ -138,7 +138,7 @@ class CameraInputs:
         CardboxError if the file of the extrinsics cannot be read, or a name is not allowed.
         """
         cameras = settings.cameras or [""]
-        self._changed, self._deliver = changed, deliver
+        self._deliver = deliver
         topics = silhouettes_of(cameras)
         self._streams = [
             InputStream(camera.strip("/") or "camera", node.resolve(topic))
@@ -162,7 +162,10 @@ class CameraInputs:
             profile = qos.SILHOUETTE if len(self._streams) == 1 else qos.SILHOUETTE_INPUT
             node.subscribe(Image, topic, pairing.add_silhouette, profile)
         # Of messages that arrive together, silhouettes are taken before their CameraInfo.
-        self._poses = CameraPoses(node, cameras, settings.extrinsics_file, self._on_poses)
+        self._poses = CameraPoses(
+            *(node, cameras, settings.extrinsics_file),
+            lambda: changed(self._poses.first, self._poses.others),
+        )
         if settings.depth:
             self._depth_input = DepthInput(node, settings.depth, self._on_depth)
         self._keypoints = KeypointInputs(node, settings, self._release)
@@ -187,9 +190,6 @@ class CameraInputs:
         """Set whether silhouettes wait for their images."""
         for pairing in self._pairings:
             pairing.waits = waits
-
-    def _on_poses(self) -> None:
-        self._changed(self._poses.first, self._poses.others)
 
     def _on_depth(self, message: Any, sent_ns: int) -> None:
         self._add(self._count, message, None, sent_ns)

@@ -195,9 +195,12 @@ class CameraNode(CardboxNode):
         if self._calibration is None:
             image = with_square_pixels(image, self._oblong)
         height, width = image.shape[:2]
-        calibration = self._calibration or assumed_calibration(
-            width, height, settings.horizontal_fov_deg
-        )
+        calibration, fov_deg = self._calibration, settings.horizontal_fov_deg
+        if calibration is None and fov_deg > 0:
+            calibration = Calibration.of_fov(width, height, fov_deg)
+        elif calibration is None:
+            # A zero K stands for an uncalibrated camera.
+            calibration = Calibration(width, height, np.zeros((3, 3)), np.zeros(5))
         self._infos.publish(conversions.calibration_message(header, calibration))
         self._images.publish(conversions.image_message(header, image, settings.encoding))
         self.diagnostics.input.add(conversions.stamp_ns(header.stamp))
@@ -219,13 +222,6 @@ class CameraNode(CardboxNode):
         self._stop.set()
         self._thread.join(timeout=2.0)
         self._capture.release()
-
-
-def assumed_calibration(width: int, height: int, horizontal_fov_deg: float) -> Calibration:
-    """Return an ideal lens of a field of view; if that is 0, an uncalibrated camera (K zero)."""
-    if horizontal_fov_deg > 0:
-        return Calibration.of_fov(width, height, horizontal_fov_deg)
-    return Calibration(width, height, np.zeros((3, 3)), np.zeros(5))
 
 
 def main(args: list[str] | None = None) -> int:

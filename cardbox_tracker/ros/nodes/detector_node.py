@@ -18,11 +18,7 @@ from cardbox_tracker.camera.stamps import WINDOW, StampOrder
 from cardbox_tracker.detectors.detector import Detector, PersonDetector
 from cardbox_tracker.detectors.pose_network import NOBODY, Detection, silhouette_of
 from cardbox_tracker.ros.messages.conversions import ImageArray, stamp_ns
-from cardbox_tracker.ros.messages.keypoints import (
-    people_message,
-    skeleton_class,
-    skeleton_message,
-)
+from cardbox_tracker.ros.messages.keypoints import people_message, skeleton_class, skeleton_message
 from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.shared_parameters import (
     camera_roll_parameter,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Iterator
 
 from sensor_msgs.msg import Image
 
@@ -64,39 +63,20 @@ MOST_BYTES = 64_000_000
 """Memory for the images of one topic; it suffices for grey images of up to 1920x1080."""
 
 
-class RecentImages:
+class RecentImages(deque[Image]):
     """Queue of the latest images, the oldest first, which drops old images for new ones."""
 
     def __init__(self, count: int, most_bytes: int = MOST_BYTES) -> None:
         """Keep at most ``count`` images of ``most_bytes`` in total, and always the latest."""
-        self._count, self._most_bytes = count, most_bytes
-        self._images: deque[Image] = deque()
-        self._bytes = 0
+        super().__init__(maxlen=count)
+        self._most_bytes = most_bytes
 
     def append(self, image: Image) -> None:
         """Add the latest image."""
-        self._images.append(image)
-        self._bytes += len(image.data)
-        while len(self._images) > 1 and (
-            len(self._images) > self._count or self._bytes > self._most_bytes
-        ):
+        super().append(image)
+        while len(self) > 1 and sum(len(one.data) for one in self) > self._most_bytes:
             self.popleft()
-
-    def popleft(self) -> Image:
-        """Remove the oldest image and return it."""
-        image = self._images.popleft()
-        self._bytes -= len(image.data)
-        return image
 
     def at(self, at_ns: int) -> Image | None:
         """Return the latest image with a stamp, ns; None if there is none."""
         return next((one for one in reversed(self) if stamp_ns(one.header.stamp) == at_ns), None)
-
-    def __len__(self) -> int:
-        return len(self._images)
-
-    def __iter__(self) -> Iterator[Image]:
-        return iter(self._images)
-
-    def __reversed__(self) -> Iterator[Image]:
-        yield from reversed(self._images)

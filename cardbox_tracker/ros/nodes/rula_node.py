@@ -60,15 +60,12 @@ class RulaNode(CardboxNode):
         # The tracker leaves out the deviations of a neck, or a hand, that it does not know.
         scores, measured = sampled_scores(image.body, known, postures, config, self._rng)
         self._score.publish(Float32(data=scores.mean))
-        self._chances.publish(_chances_message(scores))
+        count = len(scores.grand)
+        each = MultiArrayDimension(label="score", size=count, stride=count)
+        layout = MultiArrayLayout(dim=[each])
+        self._chances.publish(Float32MultiArray(layout=layout, data=scores.grand.tolist()))
         parts = part_values(scores, config, measured)
         self._report.publish(_report_message(message, scores, parts, self.get_name()))
-
-
-def _chances_message(scores: ScoreDistribution) -> Float32MultiArray:
-    count = len(scores.grand)
-    layout = MultiArrayLayout(dim=[MultiArrayDimension(label="score", size=count, stride=count)])
-    return Float32MultiArray(layout=layout, data=scores.grand.tolist())
 
 
 def _report_message(

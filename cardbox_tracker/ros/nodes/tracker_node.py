@@ -301,8 +301,9 @@ class TrackerNode(CardboxNode):
         self._scene = None
         if settings.keypoints and any(body.unknown for body in self._bodies):
             is_level = settings.camera_roll_deg != 0.0
-            scene = self._camera, *settings.given_of_scene, self._beside, is_level
-            self._scene = SceneWatch(*scene)
+            statures_m = [one or None for one in settings.statures or [settings.stature]]
+            given_scene = statures_m, settings.pitch, self._beside, is_level
+            self._scene = SceneWatch(self._camera, *given_scene)
         given = settings.config(), rng, self._others, people, self._look, self._beside
         self._session = Session(self._bodies, self._camera, *given, scene=self._scene)
         for report, tracker in zip(self._reports, self._session.trackers, strict=True):
@@ -402,8 +403,10 @@ class TrackerNode(CardboxNode):
 
     def _values(self) -> dict[str, str]:
         first = None if self._session is None else self._session.trackers[0]
-        ious = [] if first is None else first.camera_ious()
-        used = {} if first is None else first.used_texts()
+        ious, used = list[float | None](), dict[str, str]()
+        if first is not None:
+            ious = first.filter.ious()
+            used = {f"{name} used": f"{n} of {first.images}" for name, n in first.used.items()}
         agreement = None if self._session is None else self._session.agreement
         turned = {} if agreement is None else agreement.values(self._names[1:])
         common = self._inputs.values(ious) | turned | used

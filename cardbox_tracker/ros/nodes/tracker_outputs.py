@@ -16,12 +16,7 @@ from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.rep155 import Rep155Joints, joint_names
 from cardbox_tracker.person.urdf import rep155_urdf
 from cardbox_tracker.recordings.messages import pose_message
-from cardbox_tracker.recordings.outputs import (
-    TOPICS,
-    JointValues,
-    OutputStream,
-    person_space,
-)
+from cardbox_tracker.recordings.outputs import TOPICS, JointValues, OutputStream, person_space
 from cardbox_tracker.recordings.person_poses import POSES, person_poses
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.messages.types import class_of, new_message, optional_class

@@ -151,7 +151,7 @@ class TrackerParameters(NodeParameters):
         given = self.statures or [self.stature] * (self.stature > 0.0)
         if not (given or self.keypoints) or self.model_file:
             return ()
-        place, pitch = self.person_distance_m or None, self._pitch
+        place, pitch = self.person_distance_m or None, self.pitch
         bodies = [body_from_proportions(one, place) for one in given or [USUAL_STATURE_M]]
         changes = {} if given else {"stature_stddev": USUAL_STDDEV_M / USUAL_STATURE_M}
         if pitch is None:
@@ -162,16 +162,11 @@ class TrackerParameters(NodeParameters):
         return tuple(body.with_values(**changes) for body in bodies)
 
     @property
-    def _pitch(self) -> tuple[float, float] | None:
+    def pitch(self) -> tuple[float, float] | None:
         """Mean and standard deviation of the pitch that is given, rad; None for none."""
         if self.camera_pitch_deg == NOT_GIVEN_DEG:
             return None
         return math.radians(self.camera_pitch_deg), GIVEN_STDDEV
-
-    @property
-    def given_of_scene(self) -> tuple[list[float | None], tuple[float, float] | None]:
-        """The statures, None for one that is not given, and the pitch, of a ``SceneWatch``."""
-        return [one or None for one in self.statures or [self.stature]], self._pitch
 
     def config(self) -> TrackerConfig:
         """Return the settings of the core."""

@@ -44,10 +44,7 @@ def parameter(
     effect: str = NEXT_IMAGE,
 ) -> Any:
     """Return a dataclass field that :class:`LiveParameters` can declare; lists default to empty."""
-    lowest, highest = limits or (None, None)
-    spec = ParameterSpec(
-        *(description, unit, lowest, highest, choices, effect == RESTARTS), effect=effect
-    )
+    spec = ParameterSpec(description, unit, limits, choices, effect == RESTARTS, effect)
     if isinstance(default, list):
         return field(default_factory=list, metadata={"setting": spec})
     return field(default=default, metadata={"setting": spec})
@@ -114,14 +111,14 @@ def descriptor(spec: ParameterSpec, type_: Any) -> ParameterDescriptor:
         read_only=spec.read_only,
         additional_constraints=f"one of: {spec.range_text}" if spec.choices else "",
     )
-    if spec.minimum is not None and spec.maximum is not None:
+    if spec.limits is not None:
+        lowest, highest = spec.limits
         if type_ is int:
-            limits = IntegerRange(from_value=int(spec.minimum), to_value=int(spec.maximum))
+            limits = IntegerRange(from_value=int(lowest), to_value=int(highest))
             message.integer_range = [limits]
         else:
-            message.floating_point_range = [
-                FloatingPointRange(from_value=float(spec.minimum), to_value=float(spec.maximum))
-            ]
+            limits = FloatingPointRange(from_value=float(lowest), to_value=float(highest))
+            message.floating_point_range = [limits]
     return message
 
 

@@ -73,13 +73,13 @@ class LiveParameters(Generic[T]):
             raise self._refusal(
                 f"{name} is '{given}'; expected {_TYPE_TEXTS[type_]}. {name} is {spec.description}"
             )
-        if given is not None:
-            self._check_limits(name, given)
-        elif type_ in _LIST_TYPES:
+        if given is None and type_ in _LIST_TYPES:
             self._declare_empty_list(name)
             return []
         default = getattr(self._kind, name) if given is None else given
         try:
+            # Its text is clearer than rclpy's.
+            spec.check(name, default)
             self._node.declare_parameter(
                 name, default, descriptor(spec, type_), ignore_override=True
             )
@@ -98,14 +98,6 @@ class LiveParameters(Generic[T]):
         self._node.declare_parameter(name, list_type, ignore_override=True)
         self._node.set_parameters([Parameter(name, list_type, [])])
         self._node.set_descriptor(name, described)
-
-    def _check_limits(self, name: str, given: Any) -> None:
-        """Refuse a value out of range with a clearer text than rclpy's."""
-        try:
-            self._specs[name].check(name, given)
-        except ValueError as error:
-            text = f"{error}. {name} is {self._specs[name].description}"
-            raise self._refusal(text) from None
 
     def _given(self, name: str) -> Any:
         """Return the value of ``name`` from the command line or a file; None without one."""

@@ -15,12 +15,7 @@ from cardbox_tracker.applications.drawing.guidance import (
 from cardbox_tracker.applications.drawing.overlay import TEXT_BGR
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.config import InitializationConfig
-from cardbox_tracker.measuring.guidance import (
-    HOLD_STILL,
-    Prompt,
-    measuring,
-    short_words,
-)
+from cardbox_tracker.measuring.guidance import HOLD_STILL, Prompt, measuring, short_words
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import REFERENCE_NAMES, reference_posture

@@ -14,12 +14,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.tracking.estimate import NO_PERSON, TRACKING, Estimate, Place
 from cardbox_tracker.tracking.place import STATURE
-from lab.evaluation.films import (
-    SHAPES,
-    film_figures,
-    films_report,
-    make_film,
-)
+from lab.evaluation.films import SHAPES, film_figures, films_report, make_film
 from lab.evaluation.session import load_session
 
 

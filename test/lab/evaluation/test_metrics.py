@@ -9,11 +9,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from cardbox_tracker.person.skeleton import rotation_x, rotation_y, rotation_z
-from lab.evaluation.metrics import (
-    align,
-    angle_errors_deg,
-    distances_m,
-)
+from lab.evaluation.metrics import align, angle_errors_deg, distances_m
 
 
 def pa_mpjpe_m(estimates_m: NDArray[np.float64], truth_m: NDArray[np.float64]) -> float:

@@ -21,12 +21,7 @@ from lab.evaluation.people import people_figures, torso_angles
 from lab.evaluation.plan import NO_POINTS, Plan, ways_of
 from lab.evaluation.report import BEGIN, END, people_report
 from lab.evaluation.session import RecordedSession, load_session
-from lab.evaluation.tracking import (
-    BACKGROUND,
-    DETECTOR,
-    SessionRun,
-    silhouettes_of,
-)
+from lab.evaluation.tracking import BACKGROUND, DETECTOR, SessionRun, silhouettes_of
 
 PITCH_DEG = 15.0
 BODY = BodyModel.of(hip_height_m=-0.5, camera_pitch_rad=float(np.radians(PITCH_DEG)))

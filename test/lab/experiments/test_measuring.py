@@ -6,13 +6,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.person.sizes import DEFAULT_SIZES, N_SIZES, SIZE_NAMES
-from lab.experiments.measuring import (
-    ROUNDS,
-    measure,
-    person_calls,
-    seed_calls,
-    summarize_measuring,
-)
+from lab.experiments.measuring import ROUNDS, measure, person_calls, seed_calls, summarize_measuring
 
 
 def measured(off_m: float) -> dict[str, np.ndarray]:

@@ -8,16 +8,7 @@ from typing import Any
 
 from lab.evaluation.results import read_json
 from lab.experiments.digest import paper_digest
-from lab.tools.readme_figures import (
-    BEGIN,
-    END,
-    RESULTS,
-    ROWS,
-    _tracking,
-    current,
-    main,
-    section,
-)
+from lab.tools.readme_figures import BEGIN, END, RESULTS, ROWS, _tracking, current, main, section
 
 ROOT = Path(__file__).parents[3]
 

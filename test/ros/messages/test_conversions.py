@@ -21,12 +21,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
 from cardbox_tracker.recordings.markers import MarkerShape, marker_shapes
-from cardbox_tracker.recordings.outputs import (
-    TOPICS,
-    JointValues,
-    KeypointStates,
-    joints_of,
-)
+from cardbox_tracker.recordings.outputs import TOPICS, JointValues, KeypointStates, joints_of
 from cardbox_tracker.ros.messages import conversions, results
 from cardbox_tracker.ros.messages.types import class_of
 

@@ -7,11 +7,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 
 from cardbox_tracker.measuring.config import InitializationResult
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.ros.messages.results import (
-    mean_iou_of,
-    measured_message,
-    refused_message,
-)
+from cardbox_tracker.ros.messages.results import mean_iou_of, measured_message, refused_message
 
 
 def test_a_measurement_has_the_fit_of_each_reference_and_their_mean() -> None:

@@ -16,10 +16,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.camera.calibration_watch import LASTING
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode
 from cardbox_tracker.ros.nodes.camera_images import CameraImages
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode

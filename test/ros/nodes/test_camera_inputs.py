@@ -14,10 +14,7 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes import camera_poses, input_stream
 from cardbox_tracker.ros.nodes.camera_inputs import CameraInputs, ObservationSet
 from cardbox_tracker.ros.nodes.camera_poses import CameraPoses

@@ -13,18 +13,12 @@ from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-    InitializationResult,
-)
+from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult
 from cardbox_tracker.measuring.scale import scaled
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.ros.messages.conversions import image_message
-from cardbox_tracker.ros.nodes.reference_capture import (
-    DepthDistance,
-    ReferenceCapture,
-)
+from cardbox_tracker.ros.nodes.reference_capture import DepthDistance, ReferenceCapture
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 

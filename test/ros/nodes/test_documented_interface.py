@@ -22,11 +22,7 @@ from cardbox_tracker.applications.simulation.session import session_camera
 from cardbox_tracker.detectors.detector import PersonDetector
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, Group, names_of
-from cardbox_tracker.person.urdf import (
-    ROOT_LINK,
-    LinkTransforms,
-    urdf_from_body,
-)
+from cardbox_tracker.person.urdf import ROOT_LINK, LinkTransforms, urdf_from_body
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.ros.nodes import tracker_node
 from cardbox_tracker.ros.nodes.background_node import BackgroundNode

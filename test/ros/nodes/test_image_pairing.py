@@ -18,9 +18,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.common.errors import CameraError
-from cardbox_tracker.measuring.config import (
-    InitializationConfig,
-)
+from cardbox_tracker.measuring.config import InitializationConfig
 from cardbox_tracker.person.appearance import Appearance
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel

@@ -16,11 +16,7 @@ from std_msgs.msg import Header
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-    stamp_ns,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message, stamp_ns
 from cardbox_tracker.ros.nodes.camera_inputs import ImagePairing
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.tracking.estimate import Estimate

@@ -11,10 +11,7 @@ from diagnostic_msgs.msg import DiagnosticStatus
 from std_msgs.msg import Header
 
 from cardbox_tracker.camera.camera import Camera
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message
 from cardbox_tracker.ros.nodes.stereo_depth_node import StereoDepthNode
 
 CAMERA = Camera(320, 240, 250.0, 250.0, 159.5, 119.5)

@@ -18,11 +18,7 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
 from cardbox_tracker.person.posture import reference_posture
-from cardbox_tracker.ros.messages.conversions import (
-    camera_info_message,
-    image_message,
-    stamp_ns,
-)
+from cardbox_tracker.ros.messages.conversions import camera_info_message, image_message, stamp_ns
 from cardbox_tracker.ros.nodes.tracker_node import TrackerNode
 from cardbox_tracker.tracking import session
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate

@@ -20,12 +20,7 @@ from cardbox_tracker.camera.calibration_watch import CalibrationWatch
 from cardbox_tracker.camera.camera import Calibration, Camera
 from cardbox_tracker.camera.exposure import exposure_problem
 from cardbox_tracker.camera.extrinsics import Extrinsics
-from cardbox_tracker.camera.stamps import (
-    ArrivalWatch,
-    RecordedStamps,
-    StampOrder,
-    StreamStatistics,
-)
+from cardbox_tracker.camera.stamps import ArrivalWatch, RecordedStamps, StampOrder, StreamStatistics
 from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.figure import Figure

@@ -23,10 +23,11 @@ WITH_NUMBERS = [
 ]
 
 
-def whole(default: float, lowest: float | None, highest: float | None) -> int | None:
+def whole(default: float, limits: tuple[float, float] | None) -> int | None:
     """Return the integer of the range nearest to the default, or None."""
-    number = round(default) if lowest is None else max(round(default), math.ceil(lowest))
-    return number if highest is None or number <= highest else None
+    lowest, highest = limits or (-1e9, 1e9)
+    number = max(round(default), math.ceil(lowest))
+    return number if number <= highest else None
 
 
 @pytest.mark.parametrize("place", ["/**", "/**/{name}"])
@@ -38,7 +39,7 @@ def test_whole_numbers_of_a_file_are_accepted(
     numbers: dict[str, Any] = {}
     for key, spec in kind.specs().items():
         if kind.types()[key] is float:
-            number = whole(getattr(kind, key), spec.minimum, spec.maximum)
+            number = whole(getattr(kind, key), spec.limits)
             if number is not None:
                 numbers[key] = number
         elif kind.types()[key] == list[float]:

@@ -10,13 +10,7 @@ import pytest
 from diagnostic_msgs.msg import DiagnosticStatus
 
 from cardbox_tracker.camera.stamps import StampOrder, StreamStatistics
-from cardbox_tracker.ros.runtime.diagnostics import (
-    ERROR,
-    STATUS,
-    WAITING,
-    WORKING,
-    NodeDiagnostics,
-)
+from cardbox_tracker.ros.runtime.diagnostics import ERROR, STATUS, WAITING, WORKING, NodeDiagnostics
 
 PERIOD_NS = 66_666_667
 

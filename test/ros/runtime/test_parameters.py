@@ -234,8 +234,8 @@ def test_every_parameter_has_a_description_and_a_default_in_its_range(
         default = parameter_docs.default_of(kind, name)
         if spec.choices:
             assert default in spec.choices
-        if spec.minimum is not None and spec.maximum is not None:
-            assert spec.minimum <= default <= spec.maximum
+        if spec.limits is not None:
+            assert spec.limits[0] <= default <= spec.limits[1]
 
 
 @pytest.mark.parametrize("node_name", NODES)
