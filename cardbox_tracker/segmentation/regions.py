@@ -100,9 +100,6 @@ def flooded(start: NDArray[np.bool_], passable: NDArray[np.bool_]) -> NDArray[np
 def find_regions(image: ImageArray) -> Regions:
     """Return the connected regions of the pixels of ``image`` (H, W), uint8, that are 255."""
     check_array("image", image, (ANY, ANY))
-    if not image.size:
-        # OpenCV ends the process.
-        return Regions(np.zeros(image.shape, np.int32), np.zeros(0, np.int64))
     _, found = cv2.connectedComponents((image == 255).view(np.uint8), connectivity=4)
     labels = np.asarray(found, np.int32).reshape(image.shape)
     # OpenCV's own statistics take five times as long.
