@@ -20,6 +20,7 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y, TORSO_Z, state_limits
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.segmentation.regions import NO_WORDS
 from cardbox_tracker.terms import body_priors as priors
 from cardbox_tracker.terms import whole_body_kernels as kernels
 from cardbox_tracker.terms.arm_points import add_costs_of_arms, joints_of_arms
@@ -40,8 +41,6 @@ from cardbox_tracker.terms.term import ARM, ARMS, TRUNK, WHOLE, Posed, Silhouett
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 from cardbox_tracker.terms.whole_body_kernels import ObservedTuple, Points
 
-# Stands for the words of eight pixels of an image whose width is no multiple of eight.
-_NO_WORDS = np.zeros((1, 0), np.uint64)
 SIDES = tuple(ARMS)
 _BOTH_ARMS = (False, True, True)
 
@@ -132,9 +131,9 @@ class WholeBodyCost:
         upper = np.ascontiguousarray(silhouette[:rows])
         if self.covered is not None:
             unknown = np.ascontiguousarray(self.covered[:rows])
-            fill_planes(unknown, _NO_WORDS, self._beside)
+            fill_planes(unknown, NO_WORDS, self._beside)
             upper = np.where(unknown > 0, np.uint8(0), upper)
-        words = upper.view(np.uint64) if camera.width % 8 == 0 else _NO_WORDS
+        words = upper.view(np.uint64) if camera.width % 8 == 0 else NO_WORDS
         self.counted = rows, camera.width
         self.silhouette_px = int(fill_planes(upper, words, self._seen))
         if self.covered is not None:

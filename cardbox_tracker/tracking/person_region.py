@@ -199,7 +199,7 @@ class PersonRegion:
             self._person = seen
             return silhouette
         selected = np.zeros_like(silhouette)
-        paint(regions, kept, 255, selected)
+        paint(*regions[:4], kept, np.uint8(255), selected)
         self._part(selected, seen, masks, image)
         if self._other is None:
             self._things.forget()
@@ -223,16 +223,10 @@ class PersonRegion:
         none = self._none
         other = none if self._other is None else self._other
         still = none if same is None else _cells(same.view(np.uint8), self._cell_px)
-        kinds = masks.core, masks.near & ~other, before, other, still
-        # The pixels of each region are counted by the masks that have them, one bit for each.
-        cells = np.bitwise_or.reduce([kind << bit for bit, kind in enumerate(kinds)])
-        bits, combinations = len(kinds), np.arange(1 << len(kinds))
-        numbers = regions.labels << bits | self._pixels(cells, regions.labels.shape)
-        counts = np.bincount(numbers.ravel(), minlength=1 + len(regions.areas_px) << bits)
-        counts = counts.reshape(-1, len(combinations))[1:]
-        core_px, near_px, before_px, other_px, still_px = (
-            counts @ (combinations >> bit & 1) for bit in range(bits)
-        )
+        kinds = masks.core, masks.near, before, other, still
+        areas_px = np.zeros((len(kinds), len(regions.areas_px)))
+        _overlaps(*regions[:4], *kinds, self._cell_px, areas_px)
+        core_px, near_px, before_px, other_px, still_px = areas_px
         half_px, free_px = _SHARE * regions.areas_px, regions.areas_px - other_px
         # In a region that merged with another object, only the other pixels count.
         fewest_px = np.minimum(_FEWEST_CELLS * self._cell_px**2, regions.areas_px)
@@ -305,9 +299,14 @@ class PersonRegion:
 
 def warm_up() -> None:
     """Compile all functions before the first live image."""
-    things, image = StillThings(), np.full((2, 8), 255, np.uint8)
-    things.learn(image, image)
-    things.compare(image)
+    silhouette = np.full((2, 8), 255, np.uint8)
+    regions = find_regions(silhouette)
+    cells = np.zeros((2, 8), np.uint8)
+    _overlaps(*regions[:4], cells, cells, cells, cells, cells, 1, np.zeros((5, 1)))
+    paint(*regions[:4], np.ones(1, np.bool_), np.uint8(255), silhouette)
+    things = StillThings()
+    things.learn(silhouette, silhouette)
+    things.compare(silhouette)
 
 
 def _cells(image: Mask, cell_px: int) -> Mask:
@@ -322,3 +321,33 @@ def _distance(mask: Mask) -> FloatArray:
     if not mask.any():
         return np.full(mask.shape, np.inf)
     return np.asarray(cv2.distanceTransform(1 - mask, cv2.DIST_L2, 3), np.float64)
+
+
+@kernel
+def _overlaps(
+    rows: Any,
+    starts: Any,
+    ends: Any,
+    labels: Any,
+    core: Any,
+    near: Any,
+    before: Any,
+    other: Any,
+    still: Any,
+    cell_px: Any,
+    areas_px: Any,
+) -> None:
+    """Count pixels of each region in five masks (h, w), (5, m); ``other`` is not ``near``."""
+    for run in range(len(rows)):
+        label, v = labels[run], rows[run] // cell_px
+        begin, end = starts[run], ends[run]
+        in_core, in_near, in_before, in_other, in_still = 0, 0, 0, 0, 0
+        for u in range(begin // cell_px, (end - 1) // cell_px + 1):
+            count_px = min(end, (u + 1) * cell_px) - max(begin, u * cell_px)
+            in_core += count_px * core[v, u]
+            in_near += count_px * (near[v, u] & ~other[v, u])
+            in_before += count_px * before[v, u]
+            in_other += count_px * other[v, u]
+            in_still += count_px * still[v, u]
+        for kind, count_px in enumerate((in_core, in_near, in_before, in_other, in_still)):
+            areas_px[kind, label] += count_px
