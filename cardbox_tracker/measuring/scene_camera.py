@@ -54,9 +54,10 @@ _PEAK, _WITHIN = 6, 0.68
 _SHOWN = 3.0
 # A roll below the first limit, or below so many standard deviations, can be a chance.
 _LEAST_ROLL, _SURE = np.radians(2.0), 2.0
-# Relative deviation from which on a focal length is only a usual one, and share of it from which on
-# one that is found takes its place.
-_GUESSED, _BETTER = 0.1, 0.5
+GUESSED = 0.1
+"""Relative deviation from which on a focal length is only a usual one."""
+# Share of it from which on one that is found takes its place.
+_BETTER = 0.5
 # The same of any camera's focal length, from telephoto to action camera, where a distance tells it.
 _ANY_LENS = 0.5
 # Least difference of two sources that is told, rad.
@@ -419,7 +420,7 @@ def _peak(values: FloatArray, chances: FloatArray) -> tuple[float, float]:
 def lens_of(camera: Camera, factor: Value | None = None) -> Value:
     """Return the field of view across the image, rad, for a factor of the focal length if found."""
     if factor is None:
-        is_guessed = camera.focal_stddev > _GUESSED
+        is_guessed = camera.focal_stddev > GUESSED
         factor = Value(1.0, camera.focal_stddev, USUAL if is_guessed else GIVEN)
     tangent = camera.width / 2 / (camera.fx * factor.mean)
     slope = 2 * tangent / (1 + tangent**2)

@@ -128,9 +128,8 @@ FOV_HINT = "webcams 60 to 78, phones 60 to 75 held sideways, 36 to 46 upright"
 """Usual fields of view across the width of an image, degrees, for texts."""
 # Field of view along the longer side that is assumed where nothing tells it, degrees.
 _GUESSED_DEG = 65.0
-GUESSED_STDDEV = 0.3
-"""Relative standard deviation of the focal length of such a guess: webcams with 78 degrees have one
-that is a fifth shorter, and films of people are also made with one that is twice as long."""
+GUESSED_STDDEV = 0.2
+"""Relative standard deviation of the focal length of such a guess."""
 
 
 @dataclass(frozen=True)
@@ -229,7 +228,7 @@ class GivenCamera:
                 return [f"{cue.by} tells the field of view: {cue.focal:.0f} degrees across"]
             return [
                 f"{UNKNOWN_LENS}: {cue.focal:.0f} degrees across are "
-                "assumed, so distances and sizes may be wrong by a third; give --fov DEG "
+                "assumed, so distances and sizes may be wrong by a sixth; give --fov DEG "
                 f"({FOV_HINT})"
             ]
         if height <= width or self.fov_deg < _UPRIGHT_DEG:

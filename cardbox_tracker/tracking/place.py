@@ -35,6 +35,7 @@ from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.image_points import CERTAIN, POINT_INDEX, ImagePoints
 from cardbox_tracker.measuring.first_sight import is_cut
 from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
+from cardbox_tracker.measuring.scene_camera import GUESSED
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y, YAW
@@ -184,6 +185,9 @@ class PlaceWatch:
         contradiction = self.contradiction
         if "distance_m" in body.unknown and rests_on == STATURE:
             contradiction = contradiction or "no image has shown the distance yet"
+        if self._camera.focal_stddev > GUESSED and rests_on == STATURE:
+            # Lenses that films of people are made with are up to twice as long.
+            contradiction = contradiction or "nothing tells the field of view"
         if rests_on == self._scale and frame["points"] is None and is_cut(frame.silhouette):
             contradiction = contradiction or "a side of the image cuts the person"
         return Place(stddev_m, chance, rests_on, contradiction)

@@ -20,7 +20,12 @@ from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.tracking.estimate import TRACKING, UNCERTAIN, Estimate
+from cardbox_tracker.tracking.estimate import (
+    PLACE_UNCERTAIN_FROM,
+    TRACKING,
+    UNCERTAIN,
+    Estimate,
+)
 from cardbox_tracker.tracking.place import (
     DEPTH,
     MEASURED_BODY,
@@ -168,8 +173,9 @@ def test_a_stated_field_of_view_makes_a_far_place_uncertain() -> None:
 def test_no_distance_is_sure_before_a_lens_that_nobody_knows() -> None:
     guessed = replace(CAMERA, focal_stddev=GUESSED_STDDEV)
     near = PlaceWatch(TALL, guessed).see(estimate_at(0.8, TALL), TALL, frames(None)[0])
-    # 0.3 m are 1.2 deviations of 0.24 m.
-    assert near is not None and near.state is KeypointState.UNCERTAIN
+    # By its deviation alone it would be sure: 0.3 m are 1.8 deviations of 0.17 m.
+    assert near is not None and near.chance < PLACE_UNCERTAIN_FROM
+    assert near.contradiction == "nothing tells the field of view"
 
 
 def test_a_distance_that_is_only_guessed_is_uncertain_unless_depth_shows_it() -> None:
