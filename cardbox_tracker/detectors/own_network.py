@@ -122,9 +122,10 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
             continue
         if name not in LANDMARKS:
             raise ValueError(f"{quoted(name)} is no point; those are {', '.join(LANDMARKS)}")
-        column, row, score, *space = map(float, values)
+        # One more than there may be, since a generator need not end.
+        column, row, score, *space = map(float, islice(values, 7))
         if len(space) not in (0, 3):
-            raise ValueError(f"{name} has {len(values)} numbers, not 3 or 6")
+            raise ValueError(f"{name} has {3 + len(space)} numbers or more, not 3 or 6")
         check_point((name, column, row, score), shape[::-1])
         if score > 0.0:
             number = LANDMARKS.index(name)
