@@ -85,9 +85,15 @@ def test_what_are_no_people_is_told(people: Any, expected: str) -> None:
         detector(people).start()(IMAGE, 0)
 
 
-class Unprintable:
+class Unprintable(BaseException):
+    def __str__(self) -> str:
+        raise SystemExit(0)
+
     def __repr__(self) -> str:
         raise KeyError("no name")
+
+    def __float__(self) -> float:
+        raise SystemExit(0)
 
 
 def raising(error: BaseException) -> Iterator[Any]:
@@ -108,6 +114,8 @@ def raising(error: BaseException) -> Iterator[Any]:
         ),
         ([{"nose": repeat(1.0)}], "Scripted.detect, person 0: nose has 7 numbers or more"),
         (Unprintable(), "Scripted.detect returns a value of type Unprintable"),
+        (raising(Unprintable()), "Scripted.detect fails: Unprintable: its text is unknown"),
+        ([{"nose": (Unprintable(), 2, 1)}], "Scripted.detect fails: SystemExit: 0"),
         ([{Unprintable(): (1, 2, 1)}], "person 0: a value of type Unprintable is no point"),
         ([person(40)] * 5000, "Scripted.detect returns more than 200 people"),
         (repeat(person(40)), "Scripted.detect returns more than 200 people"),
