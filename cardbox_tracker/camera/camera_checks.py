@@ -76,6 +76,8 @@ def lens_problem(model: str, coefficients: FloatArray) -> str:
 _SHORTEST, _LONGEST = 0.02, 1000.0
 # The principal point lies outside the image if a driver crops a region of interest.
 _FARTHEST = 100.0
+# What rounding may leave below its diagonal.
+_ROUNDED = 1e-6
 # Beyond it, a number cannot be the side of an image.
 _MOST = 1e9
 
@@ -101,6 +103,8 @@ def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
             f"has its principal point at ({center[0]:g}, {center[1]:g}) px; expected it near the "
             f"image of {width}x{height}"
         )
+    if np.abs(values[[1, 2, 2], [0, 0, 1]]).max() > _ROUNDED:
+        return f"has numbers below its diagonal ({_shown(values)}), as if it were transposed"
     return ""
 
 
