@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cardbox_tracker.common.errors import CameraError, quoted
 
@@ -127,6 +127,18 @@ def real_number(name: str, value: object) -> float:
     except OverflowError:
         pass
     raise CameraError(f"the camera's {name} is {quoted(value)}; expected a number")
+
+
+def numbers_of(name: str, given: ArrayLike, shape: tuple[int, ...] | None = None) -> FloatArray:
+    """Return numbers of a camera as an array, by default of any shape, or raise CameraError."""
+    try:
+        values = np.asarray(given, np.float64)
+    except Exception:  # of what programs give
+        values = None
+    if values is None or (shape is not None and values.shape != shape):
+        expected = "numbers" if shape is None else f"numbers of the shape {shape}"
+        raise CameraError(f"the camera's {name} is {quoted(given)}; expected {expected}")
+    return values
 
 
 def distortion_problem(distortion: NDArray[Any]) -> str:

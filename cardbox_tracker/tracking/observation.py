@@ -10,6 +10,7 @@ import numpy as np
 
 from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
 from cardbox_tracker.camera.view import View
+from cardbox_tracker.common.settings import all_of_kind
 from cardbox_tracker.detectors.image_points import ImagePoints, whole_ns
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
@@ -48,7 +49,7 @@ def pixels_from(given: Any, name: str, size: tuple[int, int]) -> FloatArray:
 
 def people_from(given: Any, name: str, size: tuple[int, int]) -> tuple[ImagePoints, ...]:
     """Return a detector's points of several people, or raise ValueError."""
-    return tuple(points_from(one, name, size) for one in given)
+    return all_of_kind(name, given, ImagePoints)
 
 
 def _upright_points(view: View, found: ImagePoints) -> ImagePoints:

@@ -112,8 +112,12 @@ def _foreign(entry: EntryPoint) -> Format:
     name = f"{entry.name} of {place_of(entry)}"
     try:
         found = loaded(entry)
-        suffix = found.suffix if isinstance(found, Format) else None
-        if not isinstance(suffix, str) or not suffix.startswith(".") or os.sep in suffix:
+        if (
+            not isinstance(found, Format)
+            or not isinstance(found.suffix, str)
+            or not found.suffix.startswith(".")
+            or os.sep in found.suffix
+        ):
             raise CardboxError(f"{name} is no {Format} with an ending such as .trc")
     except CardboxError as error:
         return Format(f".{entry.name}", write_mot, partial(_raise, error))
