@@ -20,6 +20,7 @@ from cardbox_tracker.measuring.people_camera import (
     PITCH_PRIOR,
     USUAL_PITCH,
     Distances,
+    Sightings,
     people_camera,
 )
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
@@ -191,9 +192,14 @@ def _again(
         body if body is not None and _is_near(body, there) else there
         for body, there in zip_longest(bodies[: len(placed)], placed)
     ]
-    aways = [_away(*pair) for pair in zip(bodies, placed, strict=False)]
-    if len(aways) == 1 and not bodies[0].unknown:
-        aways = [median([aways[0], *_by_points(watched, bodies[0], camera)])]
+    # Who is who is not known, and one whom the detector lost is several people.
+    longest = max(map(len, watched.people), default=0)
+    people = [sights for sights in watched.people if len(sights) > longest / 2] or [[]]
+    aways = list[float]()
+    for body, there in zip(bodies, placed, strict=False):
+        if not body.unknown:
+            shown = ([_away(body, there), *_by_points(one, body, camera)] for one in people)
+            aways.append(min(map(median, shown), key=abs))
     away = max(aways, key=abs, default=0.0)
     if not wrong and abs(away) >= _SAME_PLACE:
         seen = watched.people, _statures_m(watched, bodies), camera
@@ -231,12 +237,11 @@ def _away(body: BodyModel, there: BodyModel) -> float:
     return math.log(there.placement.distance_m / body.placement.distance_m)
 
 
-def _by_points(watched: Watched, body: BodyModel, camera: Camera) -> Iterator[float]:
+def _by_points(sights: Sightings, body: BodyModel, camera: Camera) -> Iterator[float]:
     """Yield the logarithms of how much farther points show a body: of levels, and in space.
 
     An outline of broad parts hardly shows a body whose bones have the wrong length.
     """
-    sights = max(watched.people, key=len, default=())
     stature_m, pitch_rad = stature_of(body_parts(body.sizes)), body.camera_pose.pitch_rad
     shown = people_camera([sights], [stature_m], camera, (pitch_rad, 1e-3), (0.0, 1e-3))
     if shown is not None and (far := shown.distances[0]) is not None:

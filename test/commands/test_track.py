@@ -411,9 +411,9 @@ def test_points_show_a_body_of_short_bones_nearer(factor: float) -> None:
     bones += ("shoulder_drop", "upper_arm_length", "forearm_length")
     sizes = body.sizes.copy()
     sizes[[SIZE_INDEX[name] for name in bones]] *= factor
-    given = Watched((), (), [sights]), body.with_values(sizes=sizes), camera
+    given = sights, body.with_values(sizes=sizes), camera
     assert list(scene_module._by_points(*given)) == pytest.approx([math.log(factor)] * 2, abs=0.05)
-    assert list(scene_module._by_points(Watched((), (), []), *given[1:])) == []
+    assert list(scene_module._by_points([], *given[1:])) == []
 
 
 @pytest.mark.parametrize(
