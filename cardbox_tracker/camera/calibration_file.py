@@ -20,6 +20,8 @@ from cardbox_tracker.common.small_yaml import SmallYamlError, parse_small_yaml, 
 _EXPECTED = "a file of camera_calibration, OpenCV's FileStorage, Kalibr or aniposelib"
 # What FileStorage adds to YAML: the directive "%YAML:1.0" and the tags of its matrices.
 _NO_YAML = re.compile(r"\A%YAML.*\n|!!opencv-matrix|\A---\s*$|^---\s*\Z", re.MULTILINE)
+# First line of TOML and INI, in which sections have names in brackets.
+_SECTION = re.compile(r"(?:[ \t\r]*(?:[#;].*)?\n)*[ \t]*\[[\w.\" -]+\][ \t\r]*\n")
 # FileStorage names no model; OpenCV's sample has a switch for its fisheye.
 _FILE_STORAGE = {"distortion_model": "plumb_bob"}
 # Key that 'cardbox calibrate-camera' adds to the format of camera_calibration.
@@ -44,8 +46,8 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     """
     with foreign(path, CameraError, _EXPECTED):
         text = read_small_text(path)
-        is_toml = os.fspath(path).lower().endswith(".toml")
-        data = _of_aniposelib(tomllib.loads(text)) if is_toml else parsed_storage(text)
+        is_toml = os.fspath(path).lower().endswith(".toml") or _SECTION.match(text)
+        data = _of_toml(text) if is_toml else parsed_storage(text)
         if not isinstance(data, Mapping):
             raise CameraError("it is no mapping")
         is_camchain = all(isinstance(one, Mapping) and "intrinsics" in one for one in data.values())
@@ -54,8 +56,17 @@ def load_calibration(path: str | os.PathLike[str]) -> Calibration:
     return calibration
 
 
-def _of_aniposelib(data: Mapping[str, Any]) -> Mapping[str, Any]:
-    """Return the entries of the only camera of a camera group."""
+def _of_toml(text: str) -> Mapping[str, Any]:
+    """Return the entries of the only camera of aniposelib's camera group, or of the whole file."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise CameraError(
+            f"it is no TOML ({error}); of an INI file, such as ost.txt of camera_calibration, give "
+            "the YAML that is written beside it"
+        ) from None
+    if "camera_matrix" in data:
+        return data
     cameras = {key: one for key, one in data.items() if isinstance(one, dict) and "matrix" in one}
     if len(cameras) != 1:
         raise CameraError(

@@ -16,6 +16,7 @@ from cardbox_tracker.camera.camera_checks import (
     lens_problem,
     matrix_problem,
     normal_lens,
+    numbers_of,
     real_number,
     whole_pixels,
 )
@@ -184,8 +185,18 @@ class Calibration:
     views: float = 1.0
 
     def __post_init__(self) -> None:
-        """Bring the lens and the name of the frame into their usual form."""
-        model, distortion = normal_lens(self.distortion_model, self.distortion)
+        """Check the types, and bring the lens and the name of the frame into their usual form."""
+        for name in ("width", "height"):
+            object.__setattr__(self, name, whole_pixels(name, getattr(self, name)))
+        for name in ("roll_rad", "focal_stddev", "views"):
+            if not math.isfinite(real_number(name, getattr(self, name))):
+                raise CameraError(f"the camera's {name} is no finite number")
+        for name in ("distortion_model", "frame_id"):
+            if not isinstance(given := getattr(self, name), str):
+                raise CameraError(f"the camera's {name} is {quoted(given)}; expected text")
+        object.__setattr__(self, "k", numbers_of("K", self.k, (3, 3)))
+        distortion = numbers_of("distortion", self.distortion)
+        model, distortion = normal_lens(self.distortion_model, distortion)
         object.__setattr__(self, "distortion_model", model)
         object.__setattr__(self, "distortion", distortion)
         object.__setattr__(self, "frame_id", self.frame_id.lstrip("/") or OPTICAL_FRAME)

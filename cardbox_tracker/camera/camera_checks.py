@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cardbox_tracker.common.errors import CameraError, quoted
 
@@ -76,6 +76,8 @@ def lens_problem(model: str, coefficients: FloatArray) -> str:
 _SHORTEST, _LONGEST = 0.02, 1000.0
 # The principal point lies outside the image if a driver crops a region of interest.
 _FARTHEST = 100.0
+# What rounding may leave below its diagonal.
+_ROUNDED = 1e-6
 # Beyond it, a number cannot be the side of an image.
 _MOST = 1e9
 
@@ -101,6 +103,8 @@ def matrix_problem(k: NDArray[Any], width: int, height: int) -> str:
             f"has its principal point at ({center[0]:g}, {center[1]:g}) px; expected it near the "
             f"image of {width}x{height}"
         )
+    if np.abs(values[[1, 2, 2], [0, 0, 1]]).max() > _ROUNDED:
+        return f"has numbers below its diagonal ({_shown(values)}), as if it were transposed"
     return ""
 
 
@@ -123,6 +127,18 @@ def real_number(name: str, value: object) -> float:
     except OverflowError:
         pass
     raise CameraError(f"the camera's {name} is {quoted(value)}; expected a number")
+
+
+def numbers_of(name: str, given: ArrayLike, shape: tuple[int, ...] | None = None) -> FloatArray:
+    """Return numbers of a camera as an array, by default of any shape, or raise CameraError."""
+    try:
+        values = np.asarray(given, np.float64)
+    except Exception:  # of what programs give
+        values = None
+    if values is None or (shape is not None and values.shape != shape):
+        expected = "numbers" if shape is None else f"numbers of the shape {shape}"
+        raise CameraError(f"the camera's {name} is {quoted(given)}; expected {expected}")
+    return values
 
 
 def distortion_problem(distortion: NDArray[Any]) -> str:

@@ -7,13 +7,22 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import zip_longest
+from statistics import median
+
+import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
-from cardbox_tracker.measuring.people_camera import PITCH_PRIOR, USUAL_PITCH, Distances
+from cardbox_tracker.measuring.people_camera import (
+    PITCH_PRIOR,
+    USUAL_PITCH,
+    Distances,
+    Sightings,
+    people_camera,
+)
 from cardbox_tracker.measuring.scene import FOUND, GIVEN, USUAL, Scene, SceneCamera, Value
 from cardbox_tracker.measuring.scene_camera import (
     Background,
@@ -25,8 +34,10 @@ from cardbox_tracker.measuring.scene_camera import (
     other_lens,
     scene_camera,
 )
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
 from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import (
     Watched,
@@ -39,10 +50,11 @@ from cardbox_tracker.recordings.measured_scene import (
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.tracking.place import distance_of_points
 
-# Relative difference of the distances of a person who stands where the scene has them, and
-# deviations beyond which people contradict a scene.
-_SAME_PLACE, _CONTRADICTS = 0.15, 3.0
+# Relative difference of the distances of a person who stands where the scene has them, seconds in
+# which they stand there, and deviations beyond which people contradict a scene.
+_SAME_PLACE, _SAME_S, _CONTRADICTS = 0.15, 1.5, 3.0
 # Deviations of the camera's height by the floor that decide between a lens and a place.
 _SURE = 2.0
 
@@ -180,7 +192,15 @@ def _again(
         body if body is not None and _is_near(body, there) else there
         for body, there in zip_longest(bodies[: len(placed)], placed)
     ]
-    away = max((_away(*pair) for pair in zip(bodies, placed, strict=False)), key=abs, default=0.0)
+    # Who is who is not known, and one whom the detector lost is several people.
+    longest = max(map(len, watched.people), default=0)
+    people = [sights for sights in watched.people if len(sights) > longest / 2] or [[]]
+    aways = list[float]()
+    for body, there in zip(bodies, placed, strict=False):
+        if not body.unknown:
+            shown = ([_away(body, there), *_by_points(one, body, camera)] for one in people)
+            aways.append(min(map(median, shown), key=abs))
+    away = max(aways, key=abs, default=0.0)
     if not wrong and abs(away) >= _SAME_PLACE:
         seen = watched.people, _statures_m(watched, bodies), camera
         by_floor = other_lens(*seen, scene.camera, away)
@@ -215,6 +235,23 @@ def _away(body: BodyModel, there: BodyModel) -> float:
     if body.unknown or "distance_m" in there.unknown:
         return 0.0
     return math.log(there.placement.distance_m / body.placement.distance_m)
+
+
+def _by_points(sights: Sightings, body: BodyModel, camera: Camera) -> Iterator[float]:
+    """Yield the logarithms of how much farther points show a body: of levels, and in space.
+
+    An outline of broad parts hardly shows a body whose bones have the wrong length.
+    """
+    stature_m, pitch_rad = stature_of(body_parts(body.sizes)), body.camera_pose.pitch_rad
+    shown = people_camera([sights], [stature_m], camera, (pitch_rad, 1e-3), (0.0, 1e-3))
+    if shown is not None and (far := shown.distances[0]) is not None:
+        early = far.distances[far.times_s <= far.times_s[0] + _SAME_S]
+        yield math.log(median(early) * stature_m / body.placement.distance_m)
+    seen = (points for time_s, points in sights if time_s <= sights[0][0] + _SAME_S)
+    found_m = (distance_of_points(points, body, camera) for points in seen)
+    if known_m := [one for one in found_m if one is not None and one > 0.0]:
+        shoulders_m = pose(body, np.zeros(N_JOINTS), pitch_rad).keypoints_m[[0, 3], 2]
+        yield math.log(median(known_m) / shoulders_m.mean())
 
 
 def _is_near(body: BodyModel, there: BodyModel) -> bool:

@@ -116,5 +116,5 @@ def quoted(value: object) -> str:
         return repr(value[:_MOST_OF_A_VALUE]) + "..." * (len(value) > _MOST_OF_A_VALUE)
     try:
         return cut(repr(value), _MOST_OF_A_VALUE)
-    except (ValueError, RecursionError):  # for example an integer with thousands of digits
+    except Exception:  # of foreign classes, or an integer with thousands of digits
         return f"a value of type {type(value).__name__}"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sys
 import threading
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
@@ -59,15 +60,19 @@ def called(call: Callable[[], R], what: str, expected: str = "") -> R:
 
     It may change the working directory, and end with anything, such as what ends a program.
     """
+    streams = sys.stdout, sys.stderr
     try:
         with _confined():
-            return call()
+            found = call()
+        if any(one is not None and one.closed for one in (*streams, sys.stdout, sys.stderr)):
+            raise OSError("it closes the standard output")
+        return found
     except (CardboxError, KeyboardInterrupt):
         raise
     except BaseException as error:
         try:
             why = cut(str(error))
-        except Exception:
+        except BaseException:
             why = "its text is unknown"
         raise CardboxError(f"{what}: {type(error).__name__}: {why}{expected}") from error
 

@@ -186,7 +186,7 @@ def changed(instance: T, given: Mapping[str, Any], where: str = "") -> T:
         or isinstance(getattr(instance, entry.name), (Settings, tuple))
     }
     values: dict[str, Any] = {}
-    for name, value in given.items():
+    for name, value in _mapping(given, where or "config").items():
         _check_name(name, known, where)
         before, whole = known[name], f"{where}{name}"
         if isinstance(before, tuple):

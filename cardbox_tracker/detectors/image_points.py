@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.errors import quoted
+from cardbox_tracker.common.settings import of_kind
 from cardbox_tracker.person.sizes import FloatArray
 
 POINT_NAMES: tuple[str, ...] = (
@@ -114,6 +115,12 @@ class ImagePoints:
             spatial_m = _array("spatial_m", self.spatial_m, (count, 3))
             spatial_m[~_is_finite(spatial_m)] = np.nan
             object.__setattr__(self, "spatial_m", spatial_m)
+        if self.legs is not None:
+            given, count = of_kind("legs", self.legs, LegPoints), len(LEG_POINT_NAMES)
+            shapes = {"px": (count, 2), "scores": (count,), "spatial_m": (count, 3)}
+            for name, values in given._asdict().items():
+                if values is not None or name != "spatial_m":
+                    _array(f"{name} of legs", values, shapes[name], "LEG_POINT_NAMES")
         object.__setattr__(self, "stamp_ns", whole_ns(self.stamp_ns, "points"))
 
     @classmethod
@@ -122,13 +129,21 @@ class ImagePoints:
 
         Each has column, row and score, and may have x, y and z as in ``spatial_m``.
         """
+        if not isinstance(found, Mapping):
+            raise ValueError(f"points are {quoted(found)}; expected them by their names")
 
         def known(names: Sequence[str]) -> tuple[FloatArray, FloatArray, FloatArray | None]:
             values = np.full((len(names), 6), np.nan)
             values[:, 2] = 0.0
             for number, name in enumerate(names):
                 given = found.get(name, ())
-                values[number, : len(given)] = given
+                try:
+                    values[number, : len(given)] = given
+                except Exception:  # of what programs give
+                    raise ValueError(
+                        f"{name} is {quoted(given)}; expected column, row and score, or these and "
+                        "x, y and z"
+                    ) from None
             space = values[:, 3:]
             return values[:, :2], values[:, 2], space if np.isfinite(space).any() else None
 
@@ -221,7 +236,7 @@ def _array(
         if np.iscomplexobj(values):
             raise TypeError
         array = np.array(values, np.float64)
-    except (TypeError, ValueError, OverflowError):
+    except Exception:  # of what programs give
         raise ValueError(
             f"{name} of points is {quoted(values)}; expected numbers of the shape {shape}, ordered "
             f"as {order}"

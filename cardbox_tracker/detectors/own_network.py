@@ -76,27 +76,27 @@ class OwnNetwork(PoseNetwork):
 
     def people_in(self, image: ColorImage) -> list[Detection]:
         """Return the people in an image (H, W, 3), bgr; CardboxError if what is found are none."""
-        name, found = f"{type(self._own).__name__}.detect", list[Detection]()
+        name = f"{type(self._own).__name__}.detect"
 
-        def detect() -> Any:
+        def detect() -> list[Detection]:
             # Who draws into the image must not change what others see.
             people: Any = self._own.detect(image.copy())
-            is_several = isinstance(people, Iterable)
-            return list(islice(people, MOST_PEOPLE + 1)) if is_several else people
+            if not isinstance(people, Iterable):
+                raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
+            listed, found = list(islice(people, MOST_PEOPLE + 1)), list[Detection]()
+            if len(listed) > MOST_PEOPLE:
+                raise CardboxError(f"{name} returns more than {MOST_PEOPLE} people in an image")
+            for number, person in enumerate(listed):
+                try:
+                    found.append(_detection(person, image.shape[:2]))
+                except Exception as error:
+                    raise CardboxError(
+                        f"{name}, person {number}: {reason_of(error)}; expected column, row and "
+                        "score, or these and x, y and z, by names of points"
+                    ) from None
+            return found
 
-        people = called(detect, f"{name} fails", "; expected a list of people (docs/extending.md)")
-        if not isinstance(people, list):
-            raise CardboxError(f"{name} returns {quoted(people)}; expected a list of people")
-        if len(people) > MOST_PEOPLE:
-            raise CardboxError(f"{name} returns more than {MOST_PEOPLE} people in an image")
-        for number, person in enumerate(people):
-            try:
-                found.append(_detection(person, image.shape[:2]))
-            except Exception as error:
-                raise CardboxError(
-                    f"{name}, person {number}: {reason_of(error)}; expected column, row and "
-                    "score, or these and x, y and z, by names of points"
-                ) from None
+        found = called(detect, f"{name} fails", "; expected a list of people (docs/extending.md)")
         return [one for one in found if one.scores.any()]
 
     def detected(self, image: ColorImage, view: Square) -> list[Square]:
@@ -122,9 +122,10 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
             continue
         if name not in LANDMARKS:
             raise ValueError(f"{quoted(name)} is no point; those are {', '.join(LANDMARKS)}")
-        column, row, score, *space = map(float, values)
+        # One more than there may be, since a generator need not end.
+        column, row, score, *space = map(float, islice(values, 7))
         if len(space) not in (0, 3):
-            raise ValueError(f"{name} has {len(values)} numbers, not 3 or 6")
+            raise ValueError(f"{name} has {3 + len(space)} numbers or more, not 3 or 6")
         check_point((name, column, row, score), shape[::-1])
         if score > 0.0:
             number = LANDMARKS.index(name)

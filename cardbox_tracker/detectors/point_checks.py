@@ -41,7 +41,10 @@ def check_point(point: NamedPoint, size: Size | None) -> None:
     """Raise CardboxError if a score is no chance, or, above 0, its place far off the image."""
     name, column, row, score, *_ = point
     if not _LEAST_SCORE <= score <= _MOST_SCORE:
-        raise CardboxError(f"{cut(name)} has the score {score:g}; expected a chance from 0 to 1")
+        raise CardboxError(
+            f"{cut(name)} has the score {score:g}; expected a chance from 0 to 1: divide "
+            "percentages by 100"
+        )
     if score <= 0.0:
         return
     far_px = np.inf if size is None else _MOST_OUTSIDE * max(size)

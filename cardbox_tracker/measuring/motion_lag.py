@@ -19,8 +19,8 @@ from cardbox_tracker.person.sizes import FloatArray
 # Time whose motion is compared, between two comparisons, and the largest lag that is looked for.
 _WINDOW_NS, _EVERY_NS, _MOST_NS = 2_000_000_000, 200_000_000, 500_000_000
 # Least correlation at a lag, and how much larger it is than without; fewest pairs of heights.
-# Slow motions correlate at any lag.
-_LEAST, _MORE, _FEWEST = 0.9, 0.1, 10
+# Slow motions correlate at any lag, and so does what moves the top less than a pixel, rad.
+_LEAST, _MORE, _FEWEST, _STILL_RAD = 0.9, 0.1, 10, np.radians(0.1)
 # Deviation of the heights of joints that is motion, rad; time after which it is first compared.
 _MOTION_RAD, _SHORTEST_NS = np.radians(1.0), 600_000_000
 
@@ -101,8 +101,10 @@ def _concordance(here: FloatArray, there: FloatArray, most: int) -> float | None
 
 def _correlation(here: FloatArray, there: FloatArray, lag: int) -> float:
     one, two, count = _moved(here, there, lag)
-    power = float(np.linalg.norm(one) * np.linalg.norm(two))
-    return float(np.sum(one * two)) / max(power, 1e-12) if count >= _FEWEST else -1.0
+    powers = [float(np.linalg.norm(series)) for series in (one, two)]
+    if count < _FEWEST or min(powers) < _STILL_RAD * np.sqrt(count):
+        return -1.0
+    return float(np.sum(one * two)) / (powers[0] * powers[1])
 
 
 def _moved(here: FloatArray, there: FloatArray, lag: int) -> tuple[FloatArray, FloatArray, int]:

@@ -56,7 +56,7 @@ def check_range(name: str, value: float, lowest: float, highest: float, unit: st
     """Raise BodyModelError, with unit and range, if a value is not finite or out of range."""
     try:
         is_finite = math.isfinite(value)
-    except (TypeError, OverflowError):
+    except Exception:  # of what programs give
         is_finite = False
     if not is_finite:
         raise BodyModelError(f"{name} is {quoted(value)}; expected a finite number of {unit}")
@@ -83,7 +83,12 @@ class Person:
 
     def __post_init__(self) -> None:
         """Check every size and freeze a copy of the vector."""
-        sizes = np.array(self.sizes, dtype=np.float64)
+        try:
+            sizes = np.array(self.sizes, dtype=np.float64)
+        except Exception:  # of what programs give
+            raise BodyModelError(
+                f"sizes are {quoted(self.sizes)}; expected {N_SIZES} numbers of m"
+            ) from None
         if sizes.shape != (N_SIZES,):
             raise BodyModelError(f"sizes has shape {sizes.shape}; expected ({N_SIZES},)")
         for size, value in zip(SIZES, sizes, strict=True):
@@ -206,6 +211,9 @@ class BodyModel:
         if self.source not in SOURCES:
             raise BodyModelError(f"source is {quoted(self.source)}; expected one of {SOURCES}")
         check_range("stature_stddev", self.stature_stddev, 0.0, 1.0, "statures")
+        check_range("shoulder_rise", self.shoulder_rise, 0.0, 1.0, "shoulder breadths")
+        if not isinstance(self.appearance, Appearance | None):
+            raise BodyModelError(f"appearance is {quoted(self.appearance)}; expected an Appearance")
         for name in ("version", "stamp_ns"):
             try:
                 object.__setattr__(self, name, index(getattr(self, name)))

@@ -10,6 +10,7 @@ import numpy as np
 
 from cardbox_tracker.camera.given_arrays import depth_from, image_from, silhouette_from
 from cardbox_tracker.camera.view import View
+from cardbox_tracker.common.settings import all_of_kind
 from cardbox_tracker.detectors.image_points import ImagePoints, whole_ns
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.term import DepthImage, Image, Silhouette
@@ -57,7 +58,7 @@ CHANNELS: dict[str, Channel] = {
     "depth_m": Channel(depth_from, View.upright),
     "points": Channel(points_from, _upright_points),
     "people": Channel(
-        lambda given, name, size: tuple(points_from(one, name, size) for one in given),
+        lambda given, name, _: all_of_kind(name, given, ImagePoints),
         lambda view, found: tuple(_upright_points(view, one) for one in found),
     ),
 }

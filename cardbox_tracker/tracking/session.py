@@ -240,7 +240,8 @@ class Session:
         self._rng, self._others = settings_or(np.random.default_rng(0), rng, "rng"), others
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
-        self._scene, self._only = scene, only
+        self._scene = None if scene is None else of_kind("scene", scene, SceneWatch)
+        self._only = only
         self._people: list[_Person] = []
         # What the first camera's last image shows of each person, by number.
         self._seen: dict[int, _Share] = {}

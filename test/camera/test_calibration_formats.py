@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from cardbox_tracker.camera.calibration_file import load_calibration
+from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import CameraError
 
 K = np.array([(330.0, 0.0, 159.5), (0.0, 331.0, 119.5), (0.0, 0.0, 1.0)])
@@ -119,6 +120,25 @@ def test_toml_of_aniposelib_with_one_camera_is_read(tmp_path: Path) -> None:
     for count, names in ((2, "cam_0, cam_1"), (0, "none")):
         with pytest.raises(CameraError, match=f"cameras {names}; expected one.*--extrinsics"):
             load_calibration(aniposelib(tmp_path / "other.toml", count))
+
+
+def test_toml_and_ini_are_known_by_their_sections(tmp_path: Path) -> None:
+    named = aniposelib(tmp_path / "one.toml", 1).rename(tmp_path / "camera.txt")
+    np.testing.assert_array_equal(load_calibration(named).k, K)
+    named.write_text("# oST version 5.0 parameters\n\n[image]\n\nwidth\n320\n\nheight\n240\n")
+    with pytest.raises(CameraError, match=r"INI file.* the YAML that is written beside it"):
+        load_calibration(named)
+    named.write_text(
+        f"image_width = 320\nimage_height = 240\ncamera_matrix = {K.tolist()}\n"
+        f"distortion_coefficients = {[*LENS, 0.0]}\ndistortion_model = 'plumb_bob'\n"
+    )
+    np.testing.assert_array_equal(load_calibration(named.rename(tmp_path / "b.toml")).k, K)
+
+
+def test_a_matrix_that_is_transposed_is_refused() -> None:
+    """As MATLAB's IntrinsicMatrix; its principal point would be at the corner."""
+    with pytest.raises(CameraError, match=r"below its diagonal .*, as if it were transposed"):
+        Calibration(320, 240, K.T, np.zeros(5), "plumb_bob").camera(320, 240)
 
 
 @pytest.mark.parametrize(

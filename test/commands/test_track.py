@@ -18,12 +18,16 @@ import pytest
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands import scene as scene_module
 from cardbox_tracker.detectors import detector as detector_module
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.detectors.model_files import ModelFiles
-from cardbox_tracker.measuring.people_camera import Distances
+from cardbox_tracker.measuring.people_camera import FORWARD, LEVELS, Distances
 from cardbox_tracker.measuring.scene import SceneCamera, Value, load_scene, save_scene
 from cardbox_tracker.measuring.scene_camera import FoundCamera
-from cardbox_tracker.person.model import BodyModel
+from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.model_file import load_body_model
+from cardbox_tracker.person.parts import body_parts
+from cardbox_tracker.person.proportions import MARKED_HEIGHTS, stature_of
+from cardbox_tracker.person.sizes import SIZE_INDEX
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.measured_scene import Watched
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
@@ -384,6 +388,32 @@ def test_a_film_with_the_scene_of_another_lens_has_no_sure_place(
     assert re.search(r"somebody is 0\.[4-7]\d times as far away as in the scene", done.err)
     with b.open(encoding="utf-8") as file:
         assert {row["place_state"] for row in csv.DictReader(file)} == {"uncertain"}
+
+
+@pytest.mark.parametrize("factor", [0.75, 1.0, 1.3])
+def test_points_show_a_body_of_short_bones_nearer(factor: float) -> None:
+    """Levels of somebody upright, and points in space, whatever the breadths of the body are."""
+    camera = Camera(640, 480, 500.0, 500.0, 319.5, 239.5)
+    body = body_from_proportions(1.7, 3.0, hip_height_m=-0.7)
+    stature_m = stature_of(body_parts(body.sizes))
+    points = {}
+    heights = dict(zip(LEVELS, zip(MARKED_HEIGHTS, FORWARD, strict=True), strict=True))
+    # Hips are marked higher without feet.
+    heights |= {"hip": (MARKED_HEIGHTS[3] + 0.022, 0.0), "elbow": (MARKED_HEIGHTS[2] - 0.16, 0.0)}
+    for name in ("nose", "ear", "shoulder", "elbow", "hip"):
+        for side, beside in {"left": -0.1, "right": 0.1}.items():
+            up, forward = heights[name]
+            there = stature_m * np.array((beside, 0.9 - up, -forward)) + (0.0, 0.0, 3.0)
+            known = name if name == "nose" else f"{side}_{name}"
+            points[known] = (*camera.project(there).tolist(), 1.0, *there.tolist())
+    sights = [(0.1 * number, ImagePoints.of(points)) for number in range(30)]
+    bones = ("torso_height", "waist_height", "head_height", "neck_length", "shoulder_breadth")
+    bones += ("shoulder_drop", "upper_arm_length", "forearm_length")
+    sizes = body.sizes.copy()
+    sizes[[SIZE_INDEX[name] for name in bones]] *= factor
+    given = sights, body.with_values(sizes=sizes), camera
+    assert list(scene_module._by_points(*given)) == pytest.approx([math.log(factor)] * 2, abs=0.05)
+    assert list(scene_module._by_points([], *given[1:])) == []
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterator
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +15,7 @@ from cardbox_tracker.applications.exporting.motion import Motion
 from cardbox_tracker.commands.main import main
 from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.common.errors import CardboxError
+from cardbox_tracker.common.extensions import called
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.recordings.result_table import result_table
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
@@ -28,6 +30,8 @@ def write(path, motion, body):
 counted = Format(".counted", write)
 no_format = 7
 no_ending = Format("", write)
+no_text = Format(type("NoText", (), {"__str__": None})(), write)
+elsewhere = Format("./../x", write)
 no_library = Format(".none", write, lambda: 1 / 0)
 
 class Sees:
@@ -95,6 +99,8 @@ def test_a_detector_is_found_by_its_name(add: Callable[..., None]) -> None:
         ("broken = beside:absent", "broken of counts cannot be imported .*: AttributeError"),
         ("broken = beside:no_format", "broken of counts is no <class .*Format"),
         ("broken = beside:no_ending", "broken of counts is no <class .*Format.* ending"),
+        ("broken = beside:no_text", "broken of counts is no <class .*Format.* ending"),
+        ("broken = beside:elsewhere", "broken of counts is no <class .*Format.* ending"),
         ("broken = beside:no_library", "broken of counts cannot be used: ZeroDivisionError"),
     ],
 )
@@ -116,6 +122,7 @@ def test_a_broken_format_names_its_distribution(
         ("path.write_text('half'); raise OSError('no ink')", "fails, .*OSError: no ink"),
         ("path.write_text('half'); raise SystemExit(3)", "fails, .*SystemExit: 3"),
         ("(path.parent.parent / 'elsewhere').touch()", "not written the file"),
+        ("path.unlink(missing_ok=True); path.symlink_to(__file__)", "not written the file"),
     ],
 )
 def test_a_format_that_fails_leaves_the_old_file(
@@ -141,6 +148,12 @@ def test_a_format_cannot_change_what_others_write(add: Callable[..., None], tmp_
     before = motion.states.copy()
     formats()["counted"].write(tmp_path / "me.counted", motion, None)
     assert np.array_equal(motion.states, before, equal_nan=True)
+
+
+def test_what_closes_the_standard_output_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "stdout", StringIO())
+    with pytest.raises(CardboxError, match="it fails: OSError: it closes the standard output"):
+        called(sys.stdout.close, "it fails")
 
 
 def test_a_name_that_two_have_is_told(add: Callable[..., None]) -> None:

@@ -72,7 +72,7 @@ def test_a_mask_is_the_silhouette() -> None:
     [
         (7, r"Scripted.detect returns 7; expected a list of people"),
         ([{}, {"left_hand": (1, 2, 1)}], "person 1: 'left_hand' is no point; those are nose"),
-        ([{"nose": (1, 2, 87)}], "person 0: nose has the score 87; expected a chance from 0 to 1"),
+        ([{"nose": (1, 2, 87)}], "person 0: nose has the score 87; .* divide percentages by 100"),
         ([{"nose": (1, 2)}], "person 0: .*expected column, row and score"),
         ([{"nose": (float("nan"), 2, 1)}], r"nose is at \(nan, 2.0\) px; expected a place"),
         ([dict.fromkeys(LANDMARKS[:4], (0.2, 0.4, 1))], "shares of the image"),
@@ -83,6 +83,17 @@ def test_a_mask_is_the_silhouette() -> None:
 def test_what_are_no_people_is_told(people: Any, expected: str) -> None:
     with pytest.raises(CardboxError, match=expected):
         detector(people).start()(IMAGE, 0)
+
+
+class Unprintable(BaseException):
+    def __str__(self) -> str:
+        raise SystemExit(0)
+
+    def __repr__(self) -> str:
+        raise KeyError("no name")
+
+    def __float__(self) -> float:
+        raise SystemExit(0)
 
 
 def raising(error: BaseException) -> Iterator[Any]:
@@ -101,6 +112,11 @@ def raising(error: BaseException) -> Iterator[Any]:
             [{"nose": (10**400, 2, 1)}],
             "Scripted.detect, person 0: a value is missing, or",
         ),
+        ([{"nose": repeat(1.0)}], "Scripted.detect, person 0: nose has 7 numbers or more"),
+        (Unprintable(), "Scripted.detect returns a value of type Unprintable"),
+        (raising(Unprintable()), "Scripted.detect fails: Unprintable: its text is unknown"),
+        ([{"nose": (Unprintable(), 2, 1)}], "Scripted.detect fails: SystemExit: 0"),
+        ([{Unprintable(): (1, 2, 1)}], "person 0: a value of type Unprintable is no point"),
         ([person(40)] * 5000, "Scripted.detect returns more than 200 people"),
         (repeat(person(40)), "Scripted.detect returns more than 200 people"),
     ],

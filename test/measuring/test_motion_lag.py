@@ -22,6 +22,8 @@ def test_the_lag_of_motions_is_found_where_some_joints_are_unknown(lag: int) -> 
 def test_who_stands_or_moves_slowly_or_otherwise_shows_no_lag() -> None:
     still = RNG.normal(0.0, 0.001, (2, 40, 5))
     assert lag_of(*still, 8) is None
+    # By less than a pixel.
+    assert lag_of(0.001 * MOVES[7:47], 0.001 * MOVES[:40], 8) is None
     slow = np.linspace(0.0, 1.0, 48)[:, None]
     assert lag_of(slow[8:], slow[:-8], 8) is None
     assert lag_of(MOVES[:40], -MOVES[20:], 8) is None

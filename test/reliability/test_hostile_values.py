@@ -37,7 +37,7 @@ from cardbox_tracker.commands.arguments import add_options
 from cardbox_tracker.commands.request import Request, TrackArguments
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import nested, settings_below
-from cardbox_tracker.detectors.image_points import COCO_NAMES
+from cardbox_tracker.detectors.image_points import COCO_NAMES, ImagePoints
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.measuring.scene import Scene, SceneCamera, Value, dumps_scene, load_scene
 from cardbox_tracker.person.model import CONSTANTS, BodyModel, body_from_proportions
@@ -57,7 +57,7 @@ from cardbox_tracker.segmentation.background_file import (
 )
 from cardbox_tracker.segmentation.empty_scene import BackgroundModel
 from cardbox_tracker.tracking.estimate import Estimate
-from cardbox_tracker.tracking.observation import Observation
+from cardbox_tracker.tracking.observation import CHANNELS, Observation
 from cardbox_tracker.tracking.session import Session
 from lab.evaluation.results import read_json
 from lab.tools.reliability import refusals
@@ -65,6 +65,7 @@ from lab.tools.reliability import refusals
 ROOT = Path(__file__).parents[2]
 SIZE = (32, 24)
 CAMERA = Calibration.of_fov(*SIZE, 60.0)
+NOWHERE = np.full((17, 2), np.nan)
 ASIDE = Extrinsics(np.eye(3), np.array([-0.5, 0.0, 0.0]))
 PROMISE = "Any damaged or hostile input is read or refused with a reason"
 HOSTILE: tuple[Any, ...] = (
@@ -294,10 +295,15 @@ NUMBER = st.one_of(
     st.sampled_from(
         [
             *(f"camera {one.name}" for one in fields(Camera)),
+            *(f"calibration {one.name}" for one in fields(Calibration)),
+            *(f"points {name}" for name in ("px", "scores", "spatial_m", "legs")),
+            *("named", "named nose"),
             *(f"body {name}" for name in (*CONSTANTS, "version", "stature_stddev", "unknown")),
+            *("body sizes", "body shoulder_rise", "body appearance"),
             *(f"settings {name}" for name, *_ in settings_below(default_preset())),
             *(f"request {one.name}" for one in fields(Request)),
             *(f"session {name}" for name in ("bodies", "camera", "config", "rng", "others")),
+            *("session scene", "observed people", "changed"),
             *("session people", "session only", "pose rotation", "pose translation_m"),
             *("stamp", "field of view", "proportions"),
         ]
@@ -305,11 +311,25 @@ NUMBER = st.one_of(
     NUMBER,
 )
 @example("field of view", 5e-324)
+@example("calibration distortion_model", 7)
+@example("calibration roll_rad", np.nan)
+@example("body sizes", "abc")
+@example("body shoulder_rise", np.nan)
+@example("points legs", 7)
+@example("named nose", 5.0)
+@example("observed people", 3)
+@example("changed", len)
+@example("session scene", "abc")
 def test_any_number_in_python(of: str, value: Any) -> None:
     kind, _, name = of.partition(" ")
     camera = CAMERA.camera(*SIZE)
     make: dict[str, Callable[[], Any]] = {
         "camera": lambda: replace(camera, **{name: value}),
+        "calibration": lambda: replace(CAMERA, **{name: value}).camera(*SIZE),
+        "points": lambda: ImagePoints(**{"px": NOWHERE, "scores": np.zeros(17), name: value}),
+        "named": lambda: ImagePoints.of({"nose": value} if name else value),
+        "observed": lambda: CHANNELS[name].checked(value, name, SIZE),
+        "changed": lambda: default_preset().changed(value),
         "body": lambda: BODY.with_values(**{name: value}),
         "settings": lambda: default_preset().changed(nested({name: value})),
         "request": lambda: Request(**{"recording": Path("none"), name: value}),

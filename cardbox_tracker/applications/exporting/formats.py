@@ -107,7 +107,12 @@ def _foreign(entry: EntryPoint) -> Format:
     name = f"{entry.name} of {place_of(entry)}"
     try:
         found = loaded(entry)
-        if not isinstance(found, Format) or not str(found.suffix).startswith("."):
+        if (
+            not isinstance(found, Format)
+            or not isinstance(found.suffix, str)
+            or not found.suffix.startswith(".")
+            or os.sep in found.suffix
+        ):
             raise CardboxError(f"{name} is no {Format} with an ending such as .trc")
     except CardboxError as error:
         return Format(f".{entry.name}", write_mot, partial(_raise, error))
@@ -117,7 +122,7 @@ def _foreign(entry: EntryPoint) -> Format:
             # What it changes must not change what others write.
             own = deepcopy((motion, body))
             called(lambda: found.write(there, *own), f"{name} fails, so {path} is not written")
-            if not there.is_file() or not there.stat().st_size:
+            if there.is_symlink() or not there.is_file() or not there.stat().st_size:
                 raise CardboxError(f"{name} has not written the file whose path it was given")
 
     return found._replace(write=write, check=lambda: called(found.check, f"{name} cannot be used"))
