@@ -113,8 +113,8 @@ def whole_pixels(name: str, value: object) -> int:
     number = real_number(name, value)
     if not abs(number) < _MOST or number % 1 != 0:
         raise CameraError(
-            f"the camera's {name} is {quoted(value)}; expected a whole number of px: give the size "
-            "of the silhouettes"
+            f"the camera's {name} is {quoted(value)}; expected a whole number of px, at most "
+            f"{_MOST:.0e}: give the size of the silhouettes"
         )
     return int(number)
 
