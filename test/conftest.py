@@ -47,9 +47,8 @@ garbage.search_seldom()
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 sys.dont_write_bytecode = False
 
-# How long an example takes says nothing of the program on a busy machine. The profile "long" has
-# the many examples.
-settings.register_profile("untimed", deadline=None, max_examples=40)
+# How long an example takes says nothing of the program on a busy machine.
+settings.register_profile("untimed", deadline=None)
 settings.register_profile(
     "long",
     deadline=None,

@@ -74,7 +74,7 @@ def test_one_colour_is_one_region(width: int) -> None:
     assert not recoloured(white, 255, 5 * width + 1).any()
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=300, deadline=None)
 @given(
     st.tuples(st.integers(1, 24), st.integers(1, 40)).flatmap(
         lambda shape: arrays(np.bool_, shape, fill=st.nothing())
