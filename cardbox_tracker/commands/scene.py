@@ -9,8 +9,6 @@ from dataclasses import replace
 from itertools import zip_longest
 from statistics import median
 
-import numpy as np
-
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
 from cardbox_tracker.commands.tracking_request import PersonRequest
@@ -34,10 +32,8 @@ from cardbox_tracker.measuring.scene_camera import (
     other_lens,
     scene_camera,
 )
-from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import FOUND_STDDEV, PLACE, BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.posture import N_JOINTS
 from cardbox_tracker.person.proportions import USUAL_STATURE_M, USUAL_STDDEV_M, stature_of
 from cardbox_tracker.recordings.measured_scene import (
     Watched,
@@ -50,7 +46,7 @@ from cardbox_tracker.recordings.measured_scene import (
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.search.config import TrackerConfig
-from cardbox_tracker.tracking.place import distance_of_points
+from cardbox_tracker.tracking.place import distance_of_points, shoulders_m
 
 # Relative difference of the distances of a person who stands where the scene has them, seconds in
 # which they stand there, and deviations beyond which people contradict a scene.
@@ -250,8 +246,7 @@ def _by_points(sights: Sightings, body: BodyModel, camera: Camera) -> Iterator[f
     seen = (points for time_s, points in sights if time_s <= sights[0][0] + _SAME_S)
     found_m = (distance_of_points(points, body, camera) for points in seen)
     if known_m := [one for one in found_m if one is not None and one > 0.0]:
-        shoulders_m = pose(body, np.zeros(N_JOINTS), pitch_rad).keypoints_m[[0, 3], 2]
-        yield math.log(median(known_m) / shoulders_m.mean())
+        yield math.log(median(known_m) / shoulders_m(body, pitch_rad))
 
 
 def _is_near(body: BodyModel, there: BodyModel) -> bool:

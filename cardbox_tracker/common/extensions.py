@@ -60,11 +60,11 @@ def called(call: Callable[[], R], what: str, expected: str = "") -> R:
 
     It may change the working directory, and end with anything, such as what ends a program.
     """
-    streams = sys.stdout, sys.stderr
+    streams = [one for one in (sys.stdout, sys.stderr) if not getattr(one, "closed", True)]
     try:
         with _confined():
             found = call()
-        if any(one is not None and one.closed for one in (*streams, sys.stdout, sys.stderr)):
+        if any(one.closed for one in streams):
             raise OSError("it closes the standard output")
         return found
     except (CardboxError, KeyboardInterrupt):

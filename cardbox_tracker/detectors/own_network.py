@@ -125,7 +125,8 @@ def _detection(person: Mapping[str, Any], shape: tuple[int, int]) -> Detection:
         # One more than there may be, since a generator need not end.
         column, row, score, *space = map(float, islice(values, 7))
         if len(space) not in (0, 3):
-            raise ValueError(f"{name} has {3 + len(space)} numbers or more, not 3 or 6")
+            more = " or more" if len(space) > 3 else ""
+            raise ValueError(f"{name} has {3 + len(space)} numbers{more}, not 3 or 6")
         check_point((name, column, row, score), shape[::-1])
         if score > 0.0:
             number = LANDMARKS.index(name)

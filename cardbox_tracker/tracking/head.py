@@ -83,9 +83,8 @@ _STARTS = np.zeros((5, 6))
 _STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
 _RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
-# Time constant, s, and the largest weight of the last output of exponential smoothing: a ramp comes
-# later by less than that constant, and never by more than one interval.
-_SMOOTHING_S, _MOST_KEPT = 0.15, 0.5
+SMOOTHING_S, MOST_KEPT = 0.15, 0.5
+"""Time constant of the smoothing, s, and largest weight of the last output."""
 _DRIFT_RAD_S = 1.0
 
 
@@ -181,6 +180,16 @@ def _solve(given: _Given) -> Equations:
     return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, ENDS)
 
 
+def low_passed(before: FloatArray, values: FloatArray, interval_s: float) -> FloatArray:
+    """Return values (n,) after first-order smoothing, ``interval_s`` after the output ``before``.
+
+    y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2. A ramp is delayed
+    by dt a / (1 - a): less than the time constant, and never more than one interval.
+    """
+    kept = min(exp(-interval_s / SMOOTHING_S), MOST_KEPT)
+    return kept * before + (1.0 - kept) * values
+
+
 class HeadTracker:
     """Adds the direction of the head to the estimates of one person, smoothed over time.
 
@@ -201,8 +210,7 @@ class HeadTracker:
         neck = self._fit(frame.points, found)
         if neck is not None:
             if self._last is not None:
-                kept = min(exp(-self._age_s / _SMOOTHING_S), _MOST_KEPT)
-                angles = kept * self._last.angles + (1.0 - kept) * neck.angles
+                angles = low_passed(self._last.angles, neck.angles, self._age_s)
                 neck = neck._replace(angles=angles)
             self._last, self._age_s = neck, 0.0
         if self._last is None or found.posture is None:

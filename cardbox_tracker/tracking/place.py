@@ -107,6 +107,12 @@ def distance_of_points(points: ImagePoints, body: BodyModel, camera: Camera) -> 
     return float(here_m[:2, 2].mean() + moved_m[2])
 
 
+def shoulders_m(body: BodyModel, pitch_rad: float) -> float:
+    """Return the distance of :func:`distance_of_points` for a body that stands at its place, m."""
+    keypoints_m = pose(body, np.zeros(N_JOINTS), pitch_rad).keypoints_m
+    return float(keypoints_m[[0, 3], 2].mean())
+
+
 class PlaceWatch:
     """The place of one tracked person over time.
 
@@ -217,10 +223,11 @@ class PlaceWatch:
         if found_m is None or found_m <= 0.0:
             return
         # Both are distances of the shoulders along the optical axis.
-        keypoints_m = estimate.keypoints_m
-        if not is_second:
-            keypoints_m = pose(body, np.zeros(N_JOINTS), self._camera.pitch_rad).keypoints_m
-        is_apart = self._compared.see(found_m, float(keypoints_m[[0, 3], 2].mean()))
+        if is_second:
+            known_m = float(estimate.keypoints_m[[0, 3], 2].mean())
+        else:
+            known_m = shoulders_m(body, self._camera.pitch_rad)
+        is_apart = self._compared.see(found_m, known_m)
         shown_m, other_m = self._compared.medians if is_apart else (1.0, 1.0)
         self._apart_m, self.scale = abs(shown_m - other_m), other_m / shown_m
         self.is_too_large = shown_m > other_m
