@@ -2,7 +2,7 @@
 
 A body that was not measured (:mod:`cardbox_tracker.person.proportions`) has unknown values: the
 height of the hips, the breadths of the person with clothes, and possibly the distance. They are
-estimated by an alternating search:
+estimated by an alternating search, which also uses the points of a detector:
 
 1. The whole-body filter searches for postures of the current body.
 2. Random bodies around the current one are rated in the best of these postures, with a prior
@@ -20,6 +20,7 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.outline import filled
 from cardbox_tracker.measuring.part_colors import seen_appearance
 from cardbox_tracker.measuring.references import (
@@ -37,7 +38,8 @@ from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.pose_filter import Presence
 from cardbox_tracker.search.whole_body import WholeBodyFilter
 from cardbox_tracker.terms.compiled import CompiledSilhouette
-from cardbox_tracker.terms.term import Image, Silhouette
+from cardbox_tracker.terms.joint_points import JointPoints
+from cardbox_tracker.terms.term import Image, Silhouette, TermObservation
 from cardbox_tracker.terms.whole_body import WholeBodyCost, iou_of
 
 MIN_IOU, TOUCHING_IOU = 0.6, 0.2
@@ -111,14 +113,16 @@ def fit_first_sight(
     image: Image | None,
     config: TrackerConfig,
     rng: np.random.Generator,
+    points: ImagePoints | None = None,
 ) -> FirstSight:
     """Estimate the unknown values of a body from one silhouette (H, W) of :func:`upper_body`.
 
-    The ``image``, (H, W, 3) bgr or (H, W), of the same frame teaches the colours. Raises
-    InitializationError if no body stands where the silhouette is.
+    The ``image``, (H, W, 3) bgr or (H, W), of the same frame teaches the colours. Its ``points``
+    show the distance better than an outline with clothes does. Raises InitializationError if no
+    body stands where the silhouette is.
     """
     camera = camera.with_pitch(body.camera_pose.pitch_rad)
-    found, posture, iou = _Search(body, camera, silhouette, config, rng).run()
+    found, posture, iou = _Search(body, camera, (silhouette, points), config, rng).run()
     if iou < TOUCHING_IOU:
         raise InitializationError(
             f"no body of these proportions fits the silhouette (IoU {rounded_down(iou)}, expected "
@@ -138,11 +142,14 @@ class _Search:
         self,
         body: BodyModel,
         camera: Camera,
-        seen: Silhouette,
+        seen: tuple[Silhouette, ImagePoints | None],
         config: TrackerConfig,
         rng: np.random.Generator,
     ) -> None:
-        self._prior, self._camera, self._seen = body, camera, seen
+        self._prior, self._camera, (self._seen, self._points) = body, camera, seen
+        terms = (one.build(body, camera) for one in config.terms if isinstance(one, JointPoints))
+        self._terms = [] if self._points is None else [*terms]
+        self._observed: tuple[TermObservation, ...] = ()
         # A broad person must not be taken for a near one.
         cost = replace(config.whole_body.cost, x_step_m=_X_STEP_M)
         self._config = replace(config, whole_body=replace(config.whole_body, cost=cost))
@@ -222,6 +229,7 @@ class _Search:
     def _cost(self, body: BodyModel, postures: FloatArray) -> WholeBodyCost:
         cost = WholeBodyCost(body, self._camera, self._config.whole_body.cost)
         cost.see(self._seen, postures[0])
+        cost.terms = self._observed
         return cost
 
     def _postures(self, body: BodyModel) -> tuple[FloatArray, FloatArray]:
@@ -229,10 +237,13 @@ class _Search:
         silhouette = CompiledSilhouette(body, self._camera)
         search = WholeBodyFilter(self._config, silhouette, self._rng)
         search.approach.is_fixed = True
-        frames = [silhouette.frame(self._seen)]
-        if search.look(frames) is not Presence.PERSON:
+        frame = silhouette.frame(self._seen)
+        frame = frame.changed(channels={**frame.channels, "points": self._points})
+        if search.look([frame]) is not Presence.PERSON:
             return np.zeros((1, N_STATE)), np.array([np.inf])
-        search.follow(frames, [()])
+        observed = (term.observe(frame) for term in self._terms)
+        self._observed = tuple(one for one in observed if one is not None)
+        search.follow([frame], [self._terms])
         rated = search.rated
         order = np.argsort(rated.ratings, kind="stable")[:_POSTURES]
         return rated.states[order], rated.ratings[order]

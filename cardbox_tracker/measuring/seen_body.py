@@ -18,6 +18,7 @@ import numpy as np
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.tilt import tilted_body
 from cardbox_tracker.common.errors import BodyModelError, InitializationError
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.first_sight import FirstSight, fit_first_sight, upper_body
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.scale import scaled
@@ -84,9 +85,12 @@ class SeenBody:
         silhouette: Silhouette,
         image: Image | None,
         time_s: float,
-        is_detected: bool = False,
+        points: ImagePoints | None = None,
     ) -> bool:
-        """Fit a silhouette (H, W), and colours of its image, if due; return if ``body`` changed."""
+        """Fit a silhouette (H, W) with points, and colours of its image, if due.
+
+        Return whether ``body`` changed.
+        """
         if self._begun is not None:
             fitting, begun_s = self._begun
             if not fitting.done():
@@ -95,10 +99,12 @@ class SeenBody:
             return self._add(fitting.result, begun_s)
         if time_s < self._next_s or len(self._fits) == MOST_SIGHTS:
             return False
-        seen = upper_body(silhouette, is_detected)
+        if points is not None and not points.are_certain:
+            points = None
+        seen = upper_body(silhouette, points is not None)
         if seen is None:
             return False
-        given = self._guess, self._camera, seen, image, self._config, self._rng
+        given = self._guess, self._camera, seen, image, self._config, self._rng, points
         if self._beside is None or not self._fits:
             return self._add(partial(fit_first_sight, *given), time_s)
         self._begun = self._beside.submit(fit_first_sight, *given), time_s

@@ -164,7 +164,8 @@ def _shown(frame: RecordedFrame) -> tuple[NDArray[np.uint8], NDArray[np.uint8]]:
 
 
 def _whole(frame: RecordedFrame) -> RecordedFrame | None:
-    seen = upper_body(frame.silhouette, _is_detected(frame), frame.covered)
+    is_detected = frame.points is not None and frame.points.are_certain
+    seen = upper_body(frame.silhouette, is_detected, frame.covered)
     return None if seen is None else frame._replace(recorded=None)
 
 
@@ -191,12 +192,8 @@ def seen_person(
     camera = camera.with_pitch(guess.camera_pose.pitch_rad)
     seen = SeenBody(guess, camera, config, np.random.default_rng(seed), pause_s=0.0)
     for frame in watched.frames:
-        seen.see(frame.silhouette, frame.image, frame.time_s, _is_detected(frame))
+        seen.see(frame.silhouette, frame.image, frame.time_s, frame.points)
     return seen.in_film(far)
-
-
-def _is_detected(frame: RecordedFrame) -> bool:
-    return frame.points is not None and frame.points.are_certain
 
 
 def seen_people(

@@ -137,8 +137,7 @@ class _Person:
         frames = tracker.frames(observations)
         first = frames[0]
         is_new_start = bool(measuring.body.unknown) or self.estimate.posture is None
-        is_detected = first.points is not None and first.points.are_certain
-        if measuring.see(first.silhouette, first.image, time_s, is_detected):
+        if measuring.see(first.silhouette, first.image, time_s, first.points):
             tracker.use(measuring.body, first.stamp_ns, is_new_start)
             frames = tracker.again(frames)
         if only_measures:
