@@ -11,10 +11,12 @@ import pytest
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import InitializationError
+from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring import first_sight, seen_body
 from cardbox_tracker.measuring.first_sight import FirstSight
 from cardbox_tracker.measuring.people_camera import Distances
 from cardbox_tracker.measuring.seen_body import MOST_SIGHTS, SeenBody
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel, body_from_proportions
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.person.proportions import sizes_of_stature
@@ -89,6 +91,31 @@ def test_a_distance_that_is_not_given_is_found_roughly() -> None:
     track = Followed()
     track.track(silhouette(person(1.75, -0.6)))
     assert track.body.placement.distance_m == pytest.approx(2.0, rel=0.25)
+
+
+def test_points_show_the_distance_of_who_wears_wide_clothes() -> None:
+    """The outline is that of somebody 1.8 m away, and the points are those of 2 m."""
+    body = person(1.75, -0.6)
+    posture = reference_posture("front")
+    posture[0] = body.placement.lateral_m
+    posed = pose(body, posture)
+    names = [
+        *(f"{side}_{one}" for side in ("left", "right") for one in ("shoulder", "elbow", "index")),
+        *("left_hip", "right_hip", "left_little_finger", "right_little_finger"),
+    ]
+    hands_m = posed.keypoints_m[[2, 5]]
+    joints_m = np.concatenate([posed.keypoints_m, [posed.hip, posed.hip], hands_m])
+    pixels = CAMERA.project(CAMERA.reference_to_optical(joints_m))
+    points = ImagePoints.of({name: (*at, 0.9) for name, at in zip(names, pixels, strict=True)})
+    outline = silhouette(body.with_values(distance_m=1.8))
+    alone_m, found_m = (
+        first_sight.fit_first_sight(
+            *(body_from_proportions(1.75), CAMERA, outline, None, default_preset()),
+            *(np.random.default_rng(0), given),
+        ).body.placement.distance_m
+        for given in (None, points)
+    )
+    assert 1.75 < alone_m < found_m - 0.03 < 2.0
 
 
 def test_what_was_given_is_kept() -> None:
