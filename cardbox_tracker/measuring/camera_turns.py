@@ -25,6 +25,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.extrinsics import angle_of
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.segmentation.partial_scene import MARGIN
 
 Image = NDArray[np.uint8]
 Box = tuple[int, int, int, int]
@@ -35,8 +36,6 @@ _MOST_TANGENT, _MOST_SIDES = 1.9, 6.0
 # Standard deviations of the blurs, shares of the longer side; the first is as wide as the largest
 # step between two images.
 _BLURS = (0.04, 0.02, 0.008, 0.004)
-# What is so near to the person, or to the border of an image, does not count; the same share.
-_MARGIN = 0.03
 # Least slope of an edge, grey values a pixel, above noise; pixels of an image for one that counts;
 # those of one edge that err together.
 _SLOPE, _FOR_ONE, _TOGETHER = 3.0, 20, 8.0
@@ -174,7 +173,8 @@ class _Map:
 
     def place(self, image: Image, silhouette: Image) -> FloatArray | None:
         """Return the rotation (3, 3) into an image, which continues the map; None if unknown."""
-        reach = 2 * round(_MARGIN * self._side) + 1
+        # What is so near to the person, or to the border, does not count.
+        reach = 2 * round(MARGIN * self._side) + 1
         free = np.asarray(cv2.dilate(silhouette, np.ones((reach, reach), np.uint8)) == 0)
         border = reach // 4
         inside = np.zeros_like(free)

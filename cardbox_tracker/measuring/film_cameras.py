@@ -24,7 +24,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics, angle_of
 from cardbox_tracker.common.errors import CameraError
 from cardbox_tracker.common.least_squares import (
@@ -88,10 +88,11 @@ _FACE, _EARS = slice(0, 3), slice(3, 5)
 _FAR_SIDE_M = 0.25
 # Yaws beside that of the points in space from which fits start, rad.
 _STARTS = np.radians((0.0, -25.0, 25.0))
-_FIT_ENDS, _NEAREST_M = (25, 1e-5), 0.05
+_FIT_ENDS = 25, 1e-5
 # Steps to the points of an image, and the inverse variance, 1/m^2, that keeps those not seen.
 _INNER, _LOOSE = 4, 1e-6
-_OF_CAMERA, _TURN, _MOVE, _OFFSET = 7, slice(0, 3), slice(3, 6), 6
+_TURN, _MOVE, _OFFSET = slice(0, 3), slice(3, 6), 6
+_OF_CAMERA = _OFFSET + 1
 # Deviation of what is given.
 _GIVEN = 1e-4
 
@@ -581,7 +582,7 @@ class _Person:
         """
         at = self._at(unknowns)
         sure, depth_m = at.sure, _before(at, _triangulated(at))[..., 2]
-        is_seen = (sure > 0.0) & (depth_m > _NEAREST_M)
+        is_seen = (sure > 0.0) & (depth_m > NEAREST_M)
         count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
         far_m = np.where(count > 0, far_m, 1.0)
@@ -653,7 +654,7 @@ class _Person:
     def _errors(self, at: _At, places: FloatArray) -> FloatArray:
         """Return the errors of rays, then of bones, in deviations, (m, r)."""
         there = _before(at, places)
-        away = there[..., :2] / np.maximum(there[..., 2:], _NEAREST_M) - at.rays
+        away = there[..., :2] / np.maximum(there[..., 2:], NEAREST_M) - at.rays
         away *= self._scale * at.sure[..., None]
         bones = places[:, _ENDS[:, 0]] - places[:, _ENDS[:, 1]]
         off = at.bones * (np.linalg.norm(bones, axis=-1) - at.lengths_m)
@@ -662,7 +663,7 @@ class _Person:
     def _slopes(self, at: _At, places: FloatArray) -> FloatArray:
         """Return the derivatives of the errors by the places, (m, r, 75)."""
         there = _before(at, places)
-        ahead = np.maximum(there[..., 2:], _NEAREST_M)
+        ahead = np.maximum(there[..., 2:], NEAREST_M)
         by_there = np.zeros((*there.shape[:-1], 2, 3))
         by_there[..., :2] = np.eye(2)
         by_there[..., 2] = -there[..., :2] / ahead

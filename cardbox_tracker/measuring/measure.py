@@ -30,7 +30,7 @@ from cardbox_tracker.common.errors import InitializationError
 from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.measuring.config import InitializationConfig, InitializationResult, check_fit
 from cardbox_tracker.measuring.outline import filled
-from cardbox_tracker.measuring.part_colors import can_learn, learn_appearance
+from cardbox_tracker.measuring.part_colors import SHRINK, can_learn, learn_appearance
 from cardbox_tracker.measuring.reference_checks import check_postures
 from cardbox_tracker.measuring.references import (
     POSTURE_TEXT,
@@ -88,8 +88,6 @@ _PLACE_NOISE_M = 0.02
 _SIGMA_ALPHA_M, _ACCURACY_M = 0.05, 0.002
 # Cost of one standard deviation of a size, as a fraction of the silhouette's pixels.
 _PRIOR = 0.003
-# Factor of the noise after a round without improvement.
-_SHRINK = 0.7
 
 
 def initialize_body(
@@ -215,7 +213,7 @@ class _Search:
             if costs[winner] < best:
                 best, sizes, posture = float(costs[winner]), hypotheses[winner], postures[winner]
             else:
-                scale *= _SHRINK
+                scale *= SHRINK
             history.append(best)
             if scale * _SIGMA_ALPHA_M < _ACCURACY_M:
                 break

@@ -64,8 +64,10 @@ _MIN_PX = 40
 # Factors on the light in which one image of a part is counted, because limbs that move are lit
 # otherwise than in that image, and the forearm otherwise than the face.
 _LIGHTS = (0.7, 0.85, 1.0, 1.2, 1.4)
-# Search of the posture: rounds, postures in a round, factor of the noise, and initial noise.
-_ROUNDS, _POSTURES, _SHRINK = 8, 300, 0.7
+SHRINK = 0.7
+"""Factor of the noise of a search after a round."""
+# Search of the posture: rounds, postures in a round, and initial noise.
+_ROUNDS, _POSTURES = 8, 300
 _PLACE_M, _ROLL_RAD, _ABDUCTION_RAD = 0.03, np.radians(4.0), np.radians(10.0)
 
 
@@ -190,7 +192,7 @@ def fit_posture(
         postures = best + sigma * rng.standard_normal((_POSTURES, N_JOINTS))
         postures[0] = best
         best = postures[np.argmin(seen.postures(postures))]
-        sigma = _SHRINK * sigma
+        sigma = SHRINK * sigma
     return best
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.least_squares import (
     DIFFERENCE,
+    ENDS,
     Residuals,
     Rules,
     Solution,
@@ -64,7 +65,7 @@ _TRUNK = [
 _HIP_ALONE = 0.022
 # Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
 _LEANS = np.radians((0.5, 2.0, 0.0))
-_LEAN_STDDEVS, _LEAN_CHANGES = np.radians((3.0, 4.0, 2.0)), np.radians((3.0, 4.0, 3.0))
+_LEAN_STDDEVS = np.radians((3.0, 4.0, 2.0))
 # Deviation of the trunk's lean of people whose straight legs are not seen, rad: some sit.
 _SITTING_LEAN = np.radians(8.0)
 # How far the hips of an image are lowered: legs that are seen straight, others, and who sits.
@@ -76,19 +77,15 @@ _STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
 _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
 # Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
 _SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
-# A trunk that leans more in space is not upright, and a knee not straight; who bends the hips more
-# sits, rad. Somebody who is seen from above seems to lean, but not against the own legs: there, the
-# trunk of who stands leans less than the last value.
-_BOWED, _BENT, _SITS, _LEANS_FORWARD = np.radians((50.0, 35.0, 35.0, 20.0))
+# A trunk that leans more in space is not upright. Knees that bend more are not straight; who bends
+# the hips as much sits, rad. Somebody who is seen from above seems to lean, but not against the own
+# legs: there, the trunk of who stands leans less than the last value.
+_BOWED, _BENT, _LEANS_FORWARD = np.radians((50.0, 35.0, 20.0))
 _LEAST_LEVELS, _BORDER = 3, 0.02
 # How far people go in a second before they are first seen upright, m.
 _GOES_M = 0.1
 # Images of one person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
-# Steps of the fit, and the share of the cost that the last one gains.
-_ENDS = 60, 1e-9
-# Nearest and farthest logarithm of a distance, statures.
-_NEAREST, _FARTHEST = np.log((0.3, 30.0))
 _SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
 
 
@@ -195,7 +192,7 @@ def people_camera(
     place = np.column_stack([seen.rays[:, _SHOULDER, 0] * distance, np.log(distance)])
     of_images = np.column_stack([place, np.zeros((images, 5))])
     free = np.full((images, 2), 3.0)
-    leans = np.tile(_LEAN_CHANGES, (images, 1))
+    leans = np.tile(_LEAN_STDDEVS, (images, 1))
     steps = np.full(images, _STEP_UP)
     of_images_stddev = np.column_stack([free, leans, seen.lowered, steps])
     of_images_stddev /= np.sqrt(seen.weight)[:, None]
@@ -277,7 +274,7 @@ def _fitted(
         jacobian = jacobian.reshape(1, -1, unknowns.size)
         return pseudo_huber(away[0].reshape(1, -1), jacobian, weight=weight)
 
-    return minimize({"levels": levels}, start[None], rules, *_ENDS)
+    return minimize({"levels": levels}, start[None], rules, *ENDS)
 
 
 def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
@@ -287,7 +284,7 @@ def _rays(seen: _Seen, unknowns: FloatArray) -> FloatArray:
     heights = MARKED_HEIGHTS + unknowns[..., 5 : 5 + count]
     forward = FORWARD + unknowns[..., 5 + count : 5 + 2 * count]
     leans, changes = unknowns[..., 5 + 2 * count : 8 + 2 * count], unknowns[..., -5:-2]
-    aside, far = unknowns[..., -7:-6], np.exp(np.clip(unknowns[..., -6:-5], _NEAREST, _FARTHEST))
+    aside, far = unknowns[..., -7:-6], np.exp(unknowns[..., -6:-5])
     legs = np.minimum(heights, heights[..., _HIP : _HIP + 1]) - heights[..., _ANKLE:]
     trunk = np.maximum(heights - heights[..., _HIP : _HIP + 1], 0.0)
     forward = forward + leans[..., :1] * legs + leans[..., 1:2] * trunk
@@ -408,7 +405,7 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, floa
     of_hips = _angle(thighs.sum(axis=0), -trunk)
     bend = of_hips + sum(of_knees) / 2
     leans = _angle(trunk, hips.sum(axis=0) - ankles.sum(axis=0)) > _LEANS_FORWARD
-    return facing, is_bowed, leans, bend, max(of_knees) < _BENT, of_hips > _SITS
+    return facing, is_bowed, leans, bend, max(of_knees) < _BENT, of_hips > _BENT
 
 
 def _angle(a: FloatArray, b: FloatArray) -> float:

@@ -31,7 +31,7 @@ def rounded_up(value: float, digits: int = 2) -> str:
 Silhouette = NDArray[np.uint8]
 
 COARSE_PX = 80
-"""Columns of the images in which many outlines are compared."""
+"""Columns of images in which many outlines are compared, or where a person is expected."""
 
 MIN_PERSON_FRACTION = 0.02
 """Least fraction of the image that is covered by a person near enough to be measured."""

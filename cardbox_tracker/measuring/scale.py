@@ -26,7 +26,7 @@ from cardbox_tracker.terms.term import DepthImage, Frame, Posed
 from cardbox_tracker.terms.whole_body import WholeBodyCost
 from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
 
-_LEAST, _MOST, _STEP = 0.5, 2.0, 0.005
+_MOST, _STEP = 2.0, 0.005
 # Largest share of differing pixels of a fit.
 _LARGEST_SHARE = 0.5
 # Least number of the person's pixels with a known depth.
@@ -137,7 +137,7 @@ def scaled(body: BodyModel, scale: float) -> BodyModel:
 def _best_scale(body: BodyModel, share: Callable[[BodyModel], float | None]) -> tuple[float, float]:
     """Return the scale of ``body`` with the least share, and the share; 1 and 1 without any."""
     rated: dict[float, float] = {}
-    for scale in np.exp(np.arange(np.log(_LEAST), np.log(_MOST), _STEP)).tolist():
+    for scale in np.exp(np.arange(-np.log(_MOST), np.log(_MOST), _STEP)).tolist():
         try:
             found = share(scaled(body, scale))
         except BodyModelError:

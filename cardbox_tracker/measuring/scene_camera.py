@@ -50,10 +50,8 @@ _MISLEADING, _SYSTEMATIC = 0.2, 1.5
 _PEOPLE = np.radians(0.7)
 # Half of the width of a peak, steps of the grid; chance of one standard deviation.
 _PEAK, _WITHIN = 6, 0.68
-# Gain of the likelihood from which on edges are named as a source.
-_SHOWN = 3.0
-# A roll below the first limit, or below so many standard deviations, can be a chance.
-_LEAST_ROLL, _SURE = np.radians(2.0), 2.0
+# What differs by less than so many standard deviations can be a chance.
+_SURE = 2.0
 GUESSED = 0.1
 """Relative deviation from which on a focal length is only a usual one."""
 # Share of it from which on one that is found takes its place.
@@ -170,17 +168,16 @@ def scene_camera(
     steps = np.arange(-5, 6)
     blur = np.exp(-((steps / _SYSTEMATIC) ** 2) / 2)
     lines = np.apply_along_axis(np.convolve, 0, lines, blur / blur.sum(), "same")
-    has_edges = bool(likelihoods.max() - np.median(likelihoods) > _SHOWN)
     by_edges = _peak(PITCHES_RAD, (of_roll * lines).sum(axis=1))
     by_people = _peak(PITCHES_RAD, chances.sum(axis=1))
     both = chances * ((1 - _MISLEADING) * lines + _MISLEADING)
     pitch, pitch_stddev = _peak(PITCHES_RAD, both.sum(axis=1))
     near = np.abs(PITCHES_RAD - pitch) <= _PEAK * (PITCHES_RAD[1] - PITCHES_RAD[0])
     roll, roll_stddev = _peak(ROLLS_RAD, both[near].sum(axis=0))
-    if abs(roll) < max(_LEAST_ROLL, _SURE * roll_stddev):
+    if abs(roll) < _SURE * max(_LEVEL, roll_stddev):
         roll, roll_stddev = 0.0, float(np.hypot(roll, roll_stddev))
     # Lines that agree on several pitches show none.
-    has_edges &= by_edges[1] < FOUND_STDDEV
+    has_edges = by_edges[1] < FOUND_STDDEV
     uses_edges = has_edges and abs(by_edges[0] - pitch) < max(_TOLD, by_edges[1])
     if uses_edges:
         sources.append("the upright edges of the room")

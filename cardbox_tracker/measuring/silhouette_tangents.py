@@ -209,8 +209,8 @@ _EVERY, _FIRST = 2, 6
 # A supposed fault leaves less than this share of the height that the given pose leaves; the most
 # that counts of what it explains otherwise, degrees.
 _BETTER, _REST = 0.4, 0.1
-# Fewest joints that both cameras show.
-_LEAST_POINTS = 4
+LEAST_POINTS = 4
+"""Fewest joints that both cameras show for a comparison."""
 # Tops that differ otherwise than joints that agree, by so much, are not both the person's, degrees.
 _OTHER_TOP_DEG = 2.0
 
@@ -338,7 +338,7 @@ class PoseDirection:
 def _lower_deg(angles: FloatArray) -> float | None:
     lower = angles[0] - angles[1]
     known = np.isfinite(lower)
-    is_enough = np.count_nonzero(known) >= _LEAST_POINTS
+    is_enough = np.count_nonzero(known) >= LEAST_POINTS
     return float(np.degrees(np.median(lower[known]))) if is_enough else None
 
 

@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.least_squares import DIFFERENCE
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.posture import (
     LEFT_ARM,
@@ -51,13 +52,14 @@ Values = Mapping[str, FloatArray]
 FAR_M = 0.30
 """A keypoint that is farther off is wrong, m."""
 LOST_FROM = 0.5
-"""Probability of being wrong above which a keypoint is lost: it is rather wrong than right."""
-WHOLE_UNCERTAIN_FROM, WHOLE_LOST_FROM = 0.5, 0.9
-"""Probabilities of being lost above which a result is uncertain, and counts as a poor one."""
-HANDS, ELBOWS = [2, 5], [1, 4]
-"""Indices of the hands and the elbows among the keypoints."""
+"""Probability of being wrong above which a keypoint is lost, and of being lost above which a result
+is uncertain: it is rather wrong than right."""
+WHOLE_LOST_FROM = 0.9
+"""Probability of being lost above which a result counts as a poor one."""
 KINDS = ("shoulder", "elbow", "hand") * 2
 """Kind of each keypoint; the models have these names, and ``whole``."""
+ELBOWS, HANDS = ([i for i, one in enumerate(KINDS) if one == kind] for kind in ("elbow", "hand"))
+"""Indices of the elbows and the hands among the keypoints."""
 IMAGE = "image"
 """Name of the model of an image that has a wrong keypoint, where there is one."""
 BACK, WHOLE = "the person is seen from behind", "the whole posture may be another one"
@@ -77,8 +79,6 @@ stop and go on where the doubt is about the limit."""
 _AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
 # Least probability of a keypoint, and of its opposite, that counts in the doubt about an image.
 _LEAST_CHANCE = 1e-3
-# Step of the numerical derivatives, rad and m.
-_STEP = 1e-3
 # How much better than its rivals a result is rated, as a share of the silhouette: least, usual and
 # highest value; rating by which a mirrored arm is less likely by e; least move that counts, m.
 _BETTER, _MIRROR_RATING, _LEAST_MOVE_M = (1e-3, 0.03, 0.5), 0.05, 0.02
@@ -170,7 +170,7 @@ class Doubt:
         chances = np.array([_chance(of[kind], values, i) for i, kind in enumerate(KINDS)])
         whole = _chance(of["whole"], values, 0)
         self._whole = whole if self._whole is None else _MEMORY * (self._whole + whole)
-        reason = veto or (WHOLE if self._whole > WHOLE_UNCERTAIN_FROM else "")
+        reason = veto or (WHOLE if self._whole > LOST_FROM else "")
         is_doubted = bool(reason)
         is_unsure = chances > uncertain_from
         self._hands = remembered(self._hands, chances[HANDS])
@@ -432,7 +432,7 @@ def _spreads(
     for number in range(len(state)):
         if deviations[number] == 0.0:
             continue
-        moved[number] = state[number] + _STEP
+        moved[number] = state[number] + DIFFERENCE
         keypoints(moved, of, moved_m)
         moved[number] = state[number]
         for point in range(6):
@@ -440,7 +440,7 @@ def _spreads(
                 common = 0.5 * (moved_m[0, axis] + moved_m[3, axis])
                 common -= 0.5 * (middle_m[0, axis] + middle_m[3, axis])
                 change = moved_m[point, axis] - middle_m[point, axis] - common
-                spread_m[point] += (change * deviations[number] / _STEP) ** 2
+                spread_m[point] += (change * deviations[number] / DIFFERENCE) ** 2
     for point in range(6):
         spread_m[point] = np.sqrt(spread_m[point])
 

@@ -10,10 +10,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 from typing import Protocol
 
 import numpy as np
 
+from cardbox_tracker.camera.camera import WORKING_SIZE
 from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.camera.view import View
 from cardbox_tracker.person.cardbox import cardbox_patches
@@ -48,7 +50,6 @@ from cardbox_tracker.terms.term import (
     TorsoCosts,
 )
 
-_REFERENCE_AREA_PX = 320 * 240
 # A person from the side has about half the area of the front view, and less at the border.
 _PERSON_FRACTION = 0.25
 _RECOVERY_CYCLES = 4
@@ -118,7 +119,7 @@ class HierarchicalFilter:
         Settings that refer to 320x240 are scaled to an image of ``image_px``; ``rng`` is split.
         """
         self._config = config
-        self._scale = image_px / _REFERENCE_AREA_PX
+        self._scale = image_px / prod(WORKING_SIZE)
         streams = rng.spawn(3)
         torso_noise = np.full(4, config.torso.rotation_noise_rad)
         torso_noise[TORSO_Y] = config.torso.translation_noise_m

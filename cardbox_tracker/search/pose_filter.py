@@ -88,8 +88,8 @@ MakeFilter = Callable[
 and the views of the further cameras; returns a new filter."""
 
 
-# Share of the image above the hips that no person fills, however near.
-_FULL = 0.8
+FULL = 0.8
+"""Share of the image above the hips, or of what the arms reach, that no person fills."""
 # Factor on the foreground by which it decreases only if the person is elsewhere.
 _SUDDEN = 4
 
@@ -156,4 +156,4 @@ class PersonPresence:
 
 
 def _is_full(frame: Frame) -> bool:
-    return frame.foreground_px > _FULL * frame.rows * frame.camera.width
+    return frame.foreground_px > FULL * frame.rows * frame.camera.width

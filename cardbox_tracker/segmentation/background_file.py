@@ -43,7 +43,6 @@ _MOST_NUMBERS, _LARGEST_NUMBER = 32, 8
 # A background of 4096x4096, the largest working size, has 235 MB.
 _MOST_BYTES = 256 * 1024 * 1024
 _MAGIC, _HEADER = b"\x93NUMPY\x01\x00", struct.Struct("<8sH")
-_LONGEST_HEADER = 1024
 _WRITTEN = re.compile(
     r"\{'descr': '(?P<kind><(?:[if][48]|U\d{1,6}))', 'fortran_order': (?P<order>True|False), "
     r"'shape': \((?P<shape>(?:\d{1,12}, ?)*(?:\d{1,12})?)\), \} *\n"
@@ -134,7 +133,7 @@ def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
     begin = entry.read(_HEADER.size)
     if len(begin) < _HEADER.size or not begin.startswith(_MAGIC):
         raise ValueError(f"'{key}' is not in version 1.0 of NumPy's format")
-    text = entry.read(min(_HEADER.unpack(begin)[-1], _LONGEST_HEADER)).decode("latin-1")
+    text = entry.read(_HEADER.unpack(begin)[-1]).decode("latin-1")
     # NumPy would evaluate the header as Python, with all errors of its parser.
     header = _WRITTEN.fullmatch(text)
     if header is None:

@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.common.errors import BackgroundFileError
+from cardbox_tracker.segmentation.background import LEAST_STDDEV
+from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import (
     StoredBackground,
     load_background,
@@ -26,18 +28,16 @@ FloatImage = NDArray[np.float32]
 # Tiles along the width, and the search radius as a share of a tile's size.
 _TILES = 8
 _REACH = 0.25
-# A tile has texture if the deviation of its grey levels exceeds this multiple of the noise.
-_TEXTURE, _LEAST_TEXTURE = 1.5, 3.0
 # Smallest correlation of a found tile, and the gain that a shifted place needs.
 _FOUND, _BETTER = 0.6, 0.05
 # Smaller shifts are ignored, px.
 _SAME_PX = 1
 # Share of the tiles that must be found in place, and least number of tiles for a decision.
 _ENOUGH, _FEWEST = 0.3, 4
-# Without texture: share of the image that may look different, and the difference that counts, in
-# grey levels and relative to the expected brightness.
+# Without texture: share of the image that may look different.
 _MOST_CHANGED = 0.4
-_LEAST_CHANGE, _CHANGE = 6.0, 0.12
+# What differs as much as a person does, in these settings, looks different.
+_USUAL = BackgroundConfig()
 
 
 @dataclass(frozen=True)
@@ -84,7 +84,8 @@ def compare_scene(model: BackgroundModel, brightness: ImageArray) -> SceneFit:
             rows, columns = slice(top, top + size), slice(left, left + size)
             tile = np.ascontiguousarray(model.mean[rows, columns])
             noise = float(np.median(model.stddev[rows, columns]))
-            if float(tile.std()) < max(_TEXTURE * noise, _LEAST_TEXTURE):
+            # The deviation of the grey levels of texture exceeds the noise.
+            if float(tile.std()) < _USUAL.threshold * max(noise, LEAST_STDDEV):
                 continue
             tiles += 1
             shift = _find(tile, image, top, left, reach)
@@ -97,7 +98,7 @@ def compare_scene(model: BackgroundModel, brightness: ImageArray) -> SceneFit:
     middle = np.median(shifts, axis=0) if shifts else np.zeros(2)
     level = np.float32(np.median(image / np.maximum(model.mean, DARKEST)))
     expected = level * model.mean
-    limit = np.maximum(_LEAST_CHANGE, _CHANGE * expected)
+    limit = np.maximum(_USUAL.min_contrast, _USUAL.shadow * expected)
     changed = float(np.mean(np.abs(cv2.blur(image, (3, 3)) - expected) > limit))
     return SceneFit(tiles, in_place, len(shifts), (int(middle[0]), int(middle[1])), changed)
 

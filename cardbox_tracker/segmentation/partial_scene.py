@@ -19,9 +19,9 @@ from cardbox_tracker.segmentation.scene_motion import changed_pixels
 Mask = NDArray[np.bool_]
 FloatImage = NDArray[np.float32]
 
-# Margin of the body around moving pixels, as a share of the image's width; parts of one outline
-# whose margins touch are one body.
-_MARGIN = 0.03
+MARGIN = 0.03
+"""Margin of a person's pixels as a share of the image's width; moving parts of an outline whose
+margins touch are one body."""
 # Moving regions below this share of the image are noise.
 _LEAST = 0.0005
 # Hidden rests below this share of the image are filled from their surroundings.
@@ -91,7 +91,7 @@ def bodies(moved: Mask) -> Mask:
     image = moved.astype(np.uint8)
     _, regions, statistics, _ = cv2.connectedComponentsWithStats(image, connectivity=8)
     image[(statistics[:, cv2.CC_STAT_AREA] < _LEAST * moved.size)[regions]] = 0
-    near = cv2.dilate(image, disk(_MARGIN * width))
+    near = cv2.dilate(image, disk(MARGIN * width))
     labels, regions = cv2.connectedComponents(near, connectivity=8)
     result = np.zeros(moved.shape, np.uint8)
     for label in range(1, labels):
@@ -101,7 +101,7 @@ def bodies(moved: Mask) -> Mask:
             below = points.copy()
             below[:, 1] = height - 1
             cv2.fillConvexPoly(result, cv2.convexHull(np.concatenate([points, below])), 1)
-    return np.asarray(cv2.dilate(result, disk(_MARGIN * width)) > 0, np.bool_)
+    return np.asarray(cv2.dilate(result, disk(MARGIN * width)) > 0, np.bool_)
 
 
 def _touching(mask: Mask, body: Mask) -> Mask:

@@ -22,7 +22,8 @@ ImageArray = NDArray[np.uint8]
 
 NO_WORDS = np.zeros((1, 0), np.uint64)
 """Stands for the words of eight pixels of an image whose width is no multiple of eight."""
-_EIGHT = np.uint64(0x0101010101010101)
+LOW_BITS = np.uint64(0x0101010101010101)
+"""The lowest bit of each of eight bytes."""
 SQUARE = np.ones((3, 3), np.uint8)
 """A pixel and its eight neighbours, for morphology."""
 
@@ -136,7 +137,7 @@ def _end_of(image: Any, words: Any, v: Any, u: Any, colour: Any) -> Any:
     """Return the first column of row ``v`` from ``u`` on that is not of ``colour``."""
     # With unsigned indices, numba compiles no code for negative ones.
     row, column, width = np.uint64(v), np.uint64(u), np.uint64(image.shape[1])
-    word, one, three = np.uint64(colour) * _EIGHT, np.uint64(1), np.uint64(3)
+    word, one, three = np.uint64(colour) * LOW_BITS, np.uint64(1), np.uint64(3)
     last = np.uint64(words.shape[1])
     while column < width and image[row, column] == colour:
         column += one

@@ -16,6 +16,7 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.segmentation.regions import LOW_BITS
 
 Planes = NDArray[np.uint32]
 """Shape (2, words, rows): pixels that count, and foreground among them."""
@@ -24,7 +25,7 @@ COUNTED, FOREGROUND = 0, 1
 """Planes."""
 PIXELS, ROWS = 31, 16
 """Pixels of a word, and rows of a group."""
-_LOW_BYTES, _LOW_BITS = np.uint64(0x7F7F7F7F7F7F7F7F), np.uint64(0x0101010101010101)
+_LOW_BYTES = np.uint64(0x7F7F7F7F7F7F7F7F)
 _GATHER = np.uint64(0x0102040810204080)
 
 # With an unsigned index, numba compiles no code for negative indices.
@@ -77,7 +78,7 @@ def left_of(column: np.int32, begin: np.int32) -> np.uint32:
 def _eight_bits(pixels: np.uint64) -> np.uint64:
     """Return one bit for each byte, 1 if it is not zero; the first pixel's is the lowest."""
     is_set = ((pixels & _LOW_BYTES) + _LOW_BYTES) | pixels
-    bits: np.uint64 = (((is_set >> _index(7)) & _LOW_BITS) * _GATHER) >> _index(56)
+    bits: np.uint64 = (((is_set >> _index(7)) & LOW_BITS) * _GATHER) >> _index(56)
     return bits
 
 

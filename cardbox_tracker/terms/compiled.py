@@ -13,6 +13,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import shape_of
 from cardbox_tracker.person.posture import LEFT_ARM, N_JOINTS, TORSO
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.segmentation.regions import NO_WORDS
 from cardbox_tracker.terms import cardbox_kernels as kernels
 from cardbox_tracker.terms.bit_planes import Planes, fill_planes, new_planes
 from cardbox_tracker.terms.kernel_arguments import CardboxTuple, intrinsics_of, place_of
@@ -21,7 +22,6 @@ from cardbox_tracker.terms.term import ArmCosts, Frame, Silhouette, TorsoCosts
 
 CountArray = NDArray[np.int64]
 
-_NO_WORDS = np.zeros((1, 0), np.uint64)
 _SIDE_SIGN = {"left": 1.0, "right": -1.0}
 
 
@@ -51,7 +51,7 @@ class CompiledSilhouette(SilhouetteTerm):
         size = self.camera.height, self.camera.width
         check_array("silhouette", frame.silhouette, size)
         upper = np.ascontiguousarray(frame.silhouette[: self.rows])
-        words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else _NO_WORDS
+        words = upper.view(np.uint64) if upper.shape[1] % 8 == 0 else NO_WORDS
         planes = new_planes(self.camera.width, self.rows)
         fill_planes(upper, words, planes)
         return CompiledObservation(frame, planes, (self.rows, self.camera.width), self._cardbox)

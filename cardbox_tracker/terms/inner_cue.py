@@ -169,8 +169,8 @@ _LIMIT_NATS = 2.5
 _ALIKE = 0.05
 # Limits of the change of the light.
 _DARKEST, _BRIGHTEST = 0.6, 1.6
-# Step between pixels of the torso; fewest rows and columns, and fewest pixels in the outline.
-_STRIDE, _LEAST_SIDE_PX, _LEAST_PX = 3, 6, 20
+# Step between pixels of the torso, and fewest pixels in the outline.
+_STRIDE, _LEAST_PX = 3, 20
 
 
 @dataclass(frozen=True)
@@ -291,10 +291,8 @@ def chest_levels(image: Image, silhouette: Silhouette, zones: FloatArray) -> Flo
     The image is (H, W, channels), ``zones`` (6,) are those of :func:`zones_of`.
     """
     u, v, half_width, half_height, hips, _ = zones.tolist()
-    top, bottom = max(int(v + 1.6 * half_height), 0), int(hips - 0.1 * (hips - v))
-    left, right = max(int(u - 1.2 * half_width), 0), int(u + 1.2 * half_width)
-    if min(bottom - top, right - left) < _LEAST_SIDE_PX:
-        return None
+    top, bottom = max(int(v + 1.6 * half_height), 0), max(int(hips - 0.1 * (hips - v)), 0)
+    left, right = max(int(u - 1.2 * half_width), 0), max(int(u + 1.2 * half_width), 0)
     some = (slice(top, bottom, _STRIDE), slice(left, right, _STRIDE))
     chest = image[some][silhouette[some] > 0]
     return None if len(chest) < _LEAST_PX else np.asarray(np.median(chest, axis=0))

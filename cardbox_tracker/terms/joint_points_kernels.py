@@ -44,12 +44,15 @@ from cardbox_tracker.terms.kernel_arguments import (
 
 # Joints with a point: four of each arm, the middle of the hips, and the middle of the ears.
 SHOULDER, ELBOW, WRIST, KNUCKLES = 0, 1, 2, 3
-POINTS_OF_ARM, HIPS, EARS, N_POINTS = 4, 8, 9, 10
+POINTS_OF_ARM = KNUCKLES + 1
+HIPS = 2 * POINTS_OF_ARM
+EARS, N_POINTS = HIPS + 1, HIPS + 2
 # The middle of the shoulders, which has no point of its own.
 NECK = N_POINTS
 # Bones: upper arm and forearm of each arm, the line from the right to the left shoulder, and the
 # trunk from the hips to the neck.
-SHOULDERS, TRUNK, N_BONES = 4, 5, 6
+SHOULDERS = 4
+TRUNK, N_BONES = SHOULDERS + 1, SHOULDERS + 2
 N_RESIDUALS = 2 * N_POINTS + N_BONES
 # The rigid segment to which each point belongs; the arm's elevation raises its shoulder.
 _SEGMENT = (1, 1, 2, 2, 3, 3, 4, 4, 0, 0)

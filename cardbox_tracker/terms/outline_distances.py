@@ -28,8 +28,6 @@ ABOVE_HIPS_PX = 4
 STATE_STEP = np.array([0.02, 0.03, 0.03, 0.08, *[0.055] * (2 * ARM_ANGLES), 0.04, 0.02])
 """Steps (14,) of central differences, about 2 px; smaller steps would suffer from whole pixels."""
 
-# Images whose sides differ by a smaller share are compared as they are.
-_SAME_SIZE = 0.05
 # Margin around the person for the moved model.
 _MARGIN_PX = 24
 
@@ -37,8 +35,6 @@ _MARGIN_PX = 24
 def comparing(camera: Camera) -> Camera:
     """Return the camera at the size at which outlines are compared."""
     scale = math.sqrt(math.prod(WORKING_SIZE) / (camera.width * camera.height))
-    if abs(scale - 1.0) < _SAME_SIZE:
-        return camera
     return camera.scaled(round(scale * camera.width), round(scale * camera.height))
 
 

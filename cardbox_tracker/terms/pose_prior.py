@@ -27,7 +27,6 @@ FLOOR_NATS = 8.0
 can still outweigh it."""
 
 _DATA = "pose_prior.json"
-_D = 6
 # With an unsigned index, numba compiles no code for negative indices.
 _index = np.uint64
 
@@ -51,8 +50,8 @@ def load_gmm() -> FloatArray:
     shares, means = np.array(data["shares"]), np.array(data["means"])
     whitening = np.linalg.inv(np.linalg.cholesky(np.array(data["covariances"])))
     logs = np.log(np.diagonal(whitening, axis1=1, axis2=2)).sum(axis=1)
-    constants = np.log(shares) + logs - 0.5 * _D * np.log(2 * np.pi) - data["offset"]
-    rows, columns = np.tril_indices(_D)
+    constants = np.log(shares) + logs - 0.5 * means.shape[1] * np.log(2 * np.pi) - data["offset"]
+    rows, columns = np.tril_indices(means.shape[1])
     gmm: FloatArray = np.hstack([constants[:, None], means, whitening[:, rows, columns]])
     gmm.setflags(write=False)
     return gmm
@@ -68,7 +67,7 @@ def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
     # Like rng.multivariate_normal, which would decompose the covariance of every sample again.
     axes, squares, _ = np.linalg.svd(np.array(data["covariances"]))
     factors = axes * np.sqrt(squares)[:, None, :]
-    noise = rng.standard_normal((count, _D))
+    noise = rng.standard_normal((count, means.shape[1]))
     drawn = np.array([means[k] + factors[k] @ one for k, one in zip(chosen, noise, strict=True)])
     limbs = drawn.reshape(count, 2, 3)
     limbs /= np.linalg.norm(limbs, axis=2, keepdims=True)

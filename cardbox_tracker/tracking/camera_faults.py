@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from cardbox_tracker.common.health import WATCHES, Verdict
 from cardbox_tracker.detectors.image_points import CERTAIN, ImagePoints
 from cardbox_tracker.measuring.scene_camera import background_shift
+from cardbox_tracker.measuring.silhouette_tangents import LEAST_POINTS
 from cardbox_tracker.terms.term import USUAL_INTERVAL_S, Frame, Image, Silhouette
 from cardbox_tracker.tracking.camera_agreement import CameraAgreement
 from cardbox_tracker.tracking.observation import Observation
@@ -35,8 +36,6 @@ _LEAST = 2
 _TOLD_NS = 1_000_000_000
 # Time between comparisons of the background, ns; share of the width for the margin around people.
 _COMPARED_NS, _AROUND = 700_000_000, 20
-# Fewest points that tell.
-_FEWEST = 4
 
 
 class CameraFaults:
@@ -186,7 +185,7 @@ def likeness(before: ImagePoints | None, now: ImagePoints | None, yaw_rad: float
         return float("nan")
     places = np.concatenate([before.spatial_m, now.spatial_m], axis=1)
     known = (np.minimum(before.scores, now.scores) >= CERTAIN) & np.isfinite(places).all(axis=1)
-    if np.count_nonzero(known) < _FEWEST:
+    if np.count_nonzero(known) < LEAST_POINTS:
         return float("nan")
     one, other = np.hsplit(places[known] - places[known].mean(axis=0), 2)
     # The points are right, down and away; yaw turns from right towards the camera.

@@ -31,15 +31,15 @@ from cardbox_tracker.search.doubt import doubted
 
 OPEN, CLOSED = 0.75, 0.25
 """A hand is open above the first value of ``Hand.open``, and closed below the second."""
-HAND_KEYPOINTS = 2, 5
-"""Left and right hand among the keypoints."""
 TRACKING, UNCERTAIN, LOST, NO_PERSON = "tracking", "uncertain", "lost", "no_person"
 FILLED = "filled"
 CONTRADICTED = "the cameras contradict each other"
 """Reason of a doubt."""
 
 KEPT_S = 0.5
-"""Time for which a head or a hand that is not found keeps its result, s."""
+"""Time for which a head, a hand or legs that are not found keep their result, s."""
+LARGEST_RMS = 2.5
+"""Root of the mean square of residuals, in deviations, above which points are no face or legs."""
 PLACE_UNCERTAIN_FROM = 0.1
 """Probability of a place that is wrong above which it is uncertain."""
 

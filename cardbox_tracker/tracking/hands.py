@@ -41,7 +41,8 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.proportions import WRIST_SHARE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import FRAME_NAMES, KeypointState, turn_of
-from cardbox_tracker.tracking.estimate import HAND_KEYPOINTS, KEPT_S, Estimate, Hand
+from cardbox_tracker.search.doubt import HANDS
+from cardbox_tracker.tracking.estimate import KEPT_S, Estimate, Hand
 
 # A finger is open if its end is bent by less than the first angle from the direction of its base,
 # and closed if by more than the second, with their spread, rad.
@@ -55,7 +56,7 @@ _LEAST_PX = 12.6
 # Points at the bases of index, middle and little finger.
 _INDEX, _MIDDLE, _LITTLE = 5, 9, 17
 _SIDES = ("left", "right")
-_KEYPOINTS = dict(zip(_SIDES, HAND_KEYPOINTS, strict=True))
+_KEYPOINTS = dict(zip(_SIDES, HANDS, strict=True))
 _ELBOWS = {"left": slice(6, 8), "right": slice(10, 12)}
 
 # Side of the square around a hand, in lengths from the wrist to the knuckles, and that length, m.

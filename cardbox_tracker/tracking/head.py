@@ -40,7 +40,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import NECK_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 from cardbox_tracker.terms.term import Frame
-from cardbox_tracker.tracking.estimate import KEPT_S, Estimate
+from cardbox_tracker.tracking.estimate import KEPT_S, LARGEST_RMS, Estimate
 
 FACE_POINTS = ("nose", "left_eye", "right_eye", "left_ear", "right_ear")
 FACE_M: FloatArray = np.array(
@@ -67,8 +67,6 @@ LEAST_POINTS = 3
 """Two points do not tell turning, nodding and tilting apart."""
 LARGEST_STDDEV_RAD = np.radians(20.0)
 """Angles that the points determine less exactly are not returned."""
-LARGEST_RMS = 2.5
-"""Largest residual in its standard deviations; points that fit worse are not those of a face."""
 _N = len(NECK_LIMITS)
 # Angles of the torso about the axes of the neck.
 _OF_TORSO = [YAW, PITCH, ROLL][:_N]

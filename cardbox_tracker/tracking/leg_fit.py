@@ -23,12 +23,14 @@ from cardbox_tracker.common.least_squares import (
 from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
-N_ANGLES, N_VALUES = 8, 12
-LENGTHS, FLOOR, DISTANCE = 8, 10, 11
+LENGTHS = N_ANGLES = 8
+FLOOR = LENGTHS + 2
+DISTANCE, N_VALUES = FLOOR + 1, FLOOR + 2
 REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)
 """Deviations of the angles from those of hanging legs, (8,), rad."""
 # Of each leg: two points in the image, two slopes, and the foot; then the priors and the balance.
-_OF_LEG, _N_RESIDUALS = 7, 2 * 7 + 2 * N_ANGLES + 4 + 1
+_OF_LEG = 7
+_N_RESIDUALS = 2 * _OF_LEG + 2 * N_ANGLES + 4 + 1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
 # Shares of the mass: trunk, head and arms; thighs; shanks; feet; and how far along thigh and shank

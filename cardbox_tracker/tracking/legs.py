@@ -51,7 +51,7 @@ from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_
 from cardbox_tracker.terms.joint_points import POINT_PX
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
-from cardbox_tracker.tracking.estimate import Estimate, Legs
+from cardbox_tracker.tracking.estimate import KEPT_S, LARGEST_RMS, Estimate, Legs
 from cardbox_tracker.tracking.leg_fit import DISTANCE, N_VALUES, REST, Prior
 from cardbox_tracker.tracking.place import DEPTH, SECOND_CAMERA
 
@@ -83,8 +83,8 @@ _SLOPE_FACTORS, _SLOPE_OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08]
 _CHANGE, _CHANGE_PER_S = np.radians(8.0), np.radians(200.0)
 # Logarithms of the lengths' factors, and the floor before it is seen, m.
 _LENGTH, _FLOOR_M = 0.04, 0.12
-# Relative deviations of the tracker's distance of the hips, in all images and in each.
-_DISTANCE_SHARE, _DISTANCE_CHANGE = 0.03, 0.02
+# Relative deviation of the tracker's distance of the hips, in all images and in each.
+_DISTANCE_SHARE = 0.03
 _FIXED = 1e-6
 # Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
 # arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
@@ -98,9 +98,8 @@ _STRAIGHT_RAD, _SITS_S, _STILL_M = np.radians(60.0), 2.0, 0.08
 # Images whose information counts for what they share, because their errors are alike, and time over
 # which it is averaged, s.
 _IMAGES, _AVERAGED_S = 2.0, 3.0
-_KEPT_S = 1.0
-# Deviation of a point from which it is uncertain, m, and rms of the residuals of a wrong fit.
-_UNCERTAIN_M, _WRONG_RMS = 0.15, 3.0
+# Deviation of a point from which it is uncertain, m.
+_UNCERTAIN_M = 0.15
 # Least deviation of a point: that of the skeletons of detectors and people.
 _LEAST_M = 0.05
 # What an image without legs shows to the fit.
@@ -167,7 +166,7 @@ class LegReader:
         time_s = self._time_s
         elapsed_s = abs(time_s - self._last_s)
         change = np.full(_N, np.inf)
-        if self._last is not None and elapsed_s <= _KEPT_S:
+        if self._last is not None and elapsed_s <= KEPT_S:
             change = np.hypot(self._last_stddev, _CHANGE + _CHANGE_PER_S * elapsed_s)
         else:
             self._last = np.zeros(_N)
@@ -176,7 +175,7 @@ class LegReader:
         vector = usual @ self._usual + _IMAGES * self._mean_vector
         shared: FloatArray = np.asarray(np.linalg.solve(information, vector), np.float64)
         seen = fit.seen(points)
-        changes = np.diag([0.0, 0.0, 0.0, _DISTANCE_CHANGE**2])
+        changes = np.diag([0.0, 0.0, 0.0, _DISTANCE_SHARE**2])
         information = np.linalg.inv(np.linalg.inv(information) + changes)
         if fit.is_distance_fixed:
             shared[3] = 0.0
@@ -198,7 +197,7 @@ class LegReader:
         covariance = inverse * max(1.0, rms) ** 2
         self._last_stddev = np.minimum(np.sqrt(np.diag(covariance)[:_N]), REST)
         estimate = _moved(estimate, fit.hip_m * (np.exp(values[DISTANCE]) - 1.0), camera)
-        if seen is not None and (seen.scores >= CERTAIN).all() and rms < _WRONG_RMS:
+        if seen is not None and (seen.scores >= CERTAIN).all() and rms < LARGEST_RMS:
             after = np.linalg.inv(inverse[_SHARED, _SHARED])
             step_s = min(max(elapsed_s, 0.01), 0.2)
             self._seen_s = min(self._seen_s + step_s, _AVERAGED_S)
@@ -358,7 +357,7 @@ class _Fit:
         variance = variance.reshape(6, 3).sum(axis=1)
         stddev_m = np.sqrt(np.maximum(variance, 0.0) + _LEAST_M**2)
         is_seen = np.zeros(6) if seen is None else seen.scores.ravel() >= CERTAIN
-        is_wrong = rms > _WRONG_RMS or (seen is not None and seen.shows_back)
+        is_wrong = rms > LARGEST_RMS or (seen is not None and seen.shows_back)
         states = tuple(
             KeypointState.HIDDEN
             if not is_there

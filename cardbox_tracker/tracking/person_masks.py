@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.camera import NEAREST_M, Camera
+from cardbox_tracker.measuring.references import COARSE_PX
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, TORSO_X
@@ -55,15 +56,12 @@ Mask = NDArray[np.uint8]
 Point = tuple[float, float, float]
 """Column and row in cells, and cells per metre at the point's depth."""
 
-_CELLS_IN_A_ROW = 80
 # Clothes are added to the widths of the body model.
 _CLOTHES_M = 0.02
 # All foreground within this distance of the last posture belongs to the person.
 _BAND_M = 0.1
 # Distance from the fist to the fingertips, plus the error of keypoints.
 _BEYOND_HAND_M = 0.25
-# Limit of the dilation in cells.
-_WIDEST = 40
 # Gap and width of the background ring around head and shoulders.
 _GAP_M, _RING_M = 0.05, 0.2
 
@@ -96,7 +94,7 @@ class PersonDrawer:
     def __init__(self, body: BodyModel, camera: Camera) -> None:
         """Set up the grid; ``camera`` includes the pitch."""
         self._body = body
-        self.cell_px = cell = max(1, round(camera.width / _CELLS_IN_A_ROW))
+        self.cell_px = cell = max(1, round(camera.width / COARSE_PX))
         self.shape = -(-camera.height // cell), -(-camera.width // cell)
         self._camera = replace(
             camera,
@@ -194,8 +192,8 @@ class PersonDrawer:
 
 
 def grown(mask: Mask, cells: float) -> Mask:
-    """Return a mask (h, w), 0 or 1, dilated by a disc whose radius is ``cells``, at most 40."""
-    wide = 2 * max(0, min(round(cells), _WIDEST)) + 1
+    """Return a mask (h, w), 0 or 1, dilated by a disc whose radius is ``cells``."""
+    wide = 2 * max(0, min(round(cells), sum(mask.shape))) + 1
     disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (wide, wide))
     return np.asarray(cv2.dilate(mask, disc), np.uint8)
 

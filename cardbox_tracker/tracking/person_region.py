@@ -24,6 +24,7 @@ from cardbox_tracker.common.array_checks import check_array
 from cardbox_tracker.common.compiling import copied_kernel, kernel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.pose_filter import FULL
 from cardbox_tracker.segmentation.regions import Regions, find_regions, paint
 from cardbox_tracker.tracking.person_masks import Mask, PersonDrawer, PersonMasks, grown
 
@@ -131,8 +132,6 @@ _STEP_M = 0.1
 _SHARE = 0.5
 # Regions touch if they share this number of cells.
 _FEWEST_CELLS = 3
-# If this share of the reachable cells is foreground, the light has changed.
-_FULL = 0.8
 # Foreground areas, in body areas, beyond which another object may touch the person.
 _LARGE = 1.5
 # The person is sought elsewhere only if head and shoulders fit better there by this score.
@@ -253,7 +252,8 @@ class PersonRegion:
             nearer = (from_other < _distance(self._person)) & (from_other <= self._step)
             other[(kept > 0) & nearer] = 1
         beyond = kept & (1 - masks.reach)
-        full = np.count_nonzero(kept & masks.reach) >= _FULL * np.count_nonzero(masks.reach)
+        # If they are full, the light has changed.
+        full = np.count_nonzero(kept & masks.reach) >= FULL * np.count_nonzero(masks.reach)
         if not full and np.count_nonzero(beyond) >= _FEWEST_CELLS:
             other |= beyond
         if other.any():

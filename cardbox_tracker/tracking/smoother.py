@@ -66,7 +66,7 @@ LAG_S = 0.5
 _CUTOFFS_HZ = np.array([1.5, 2.0, 2.5, 3.0, 3.5, 4.0])
 # Deviation of the part that changes, m or rad, in images of this rate.
 _NOISE, _RATE_HZ = 0.05, 30.0
-_FREEDOM, _ROUNDS, _FIRST_ROUNDS = 4.0, 8, 4
+_FREEDOM, _ROUNDS = 4.0, 8
 # In how many values the usual noise counts beside that of the residuals.
 _PRIOR = 1.0
 # Nobody turns as far between two images: the tracker has found that it was wrong.
@@ -79,9 +79,11 @@ _OWN = np.repeat(np.arange(8), (3, 3, 3, 3, 3, 3, 2, 8))
 _WITH = np.concatenate([[0, 1, 1, 1, 2, 2, 3, 3, 4, 4, 5, 5, 0, 0], [7] * 18])
 _OF = np.concatenate([_OWN, _WITH])
 _BEGINS, _COUNTS = np.unique(_OWN, return_index=True, return_counts=True)[1:]
-_PLACED, _LIMBS, _NECK, _LEGS = slice(0, 18), slice(6, 18), slice(18, 20), slice(20, 28)
 _LIMB_GROUPS = slice(2, 6)
-_STDDEVS, _LEG_POINTS = slice(28, 42), slice(42, 60)
+_LIMBS = slice(_BEGINS[_LIMB_GROUPS.start], _BEGINS[_LIMB_GROUPS.stop])
+_PLACED, _NECK = slice(_LIMBS.stop), slice(_LIMBS.stop, _BEGINS[-1])
+_LEGS, _STDDEVS = slice(_NECK.stop, len(_OWN)), slice(len(_OWN), len(_OWN) + PLACE.stop)
+_LEG_POINTS = slice(_STDDEVS.stop, len(_OF))
 # The deviations that belong to place, trunk and each limb.
 _LASTING = [np.flatnonzero(_WITH[: PLACE.stop] == group) for group in range(6)]
 # What has rates: the joints of posture and place, the rises of the shoulders, then keypoints.
@@ -298,10 +300,10 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
         bending = (2.0 * np.pi * cutoff_hz) ** -4 * (q @ curves) + 1e-9 * eye
         return np.asarray(bending + weights[..., None] * eye)
 
-    def fitted(cutoff_hz: float, rounds: int, groups: slice) -> tuple[FloatArray, FloatArray]:
+    def fitted(cutoff_hz: float, groups: slice) -> tuple[FloatArray, FloatArray]:
         """Return the weights (k, n) of groups after some rounds, and squares of errors (k, n)."""
         seen, weights = own[groups], usual[groups]
-        for _ in range(rounds):
+        for _ in range(_ROUNDS):
             smooth = np.linalg.solve(precision(cutoff_hz, weights), weights[..., None] * seen)
             squares = np.sum((seen - smooth) ** 2, axis=2)
             errors = squares * (_RATE_HZ * around_s) / _NOISE**2
@@ -310,7 +312,7 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
         return weights, squares
 
     limbs = own[_LIMB_GROUPS, :, :3]
-    weights = fitted(_CUTOFFS_HZ[-1], _FIRST_ROUNDS, _LIMB_GROUPS)[0]
+    weights = fitted(_CUTOFFS_HZ[-1], _LIMB_GROUPS)[0]
 
     def misfit(cutoff_hz: float) -> float:
         """Return -2 times the logarithm of the likelihood of the limbs, less a constant."""
@@ -320,7 +322,7 @@ def spline(time_s: FloatArray, values: FloatArray, has_rates: bool = False) -> S
         return float(fit / _NOISE**2 + 3.0 * spread)
 
     cutoff_hz = float(min(_CUTOFFS_HZ, key=misfit))
-    used, squares = fitted(cutoff_hz, _ROUNDS, slice(None))
+    used, squares = fitted(cutoff_hz, slice(None))
     inverse = np.linalg.inv(precision(cutoff_hz, used))
     smooth = np.einsum("kij,kj->ki", inverse[_OF], used[_OF] * known)
     variance = _NOISE**2 / _RATE_HZ * np.diagonal(inverse, axis1=1, axis2=2)

@@ -38,8 +38,6 @@ from cardbox_tracker.tracking.person_region import PersonRegion
 _AWAY = 0.02
 # Least jump, m, and share of the depth by which a sensor's noise may exceed it.
 _JUMP_M, _JUMP_SHARE = 0.06, 0.02
-# Depth of pixels without one, m.
-_FAR_M = 100.0
 # Fewest pairs of an image that count, and largest number that are compared.
 _LEAST_PAIRS, _MOST_PAIRS = 20, 120
 # Images between samples.
@@ -61,15 +59,15 @@ def surplus_of_jumps(silhouette: Silhouette, depth_m: DepthImage) -> float | Non
     """
     inner, outer = _pairs(silhouette)
     here, there = (
-        np.where(np.isfinite(one) & (one > 0.0), one, _FAR_M)
+        np.where(np.isfinite(one) & (one > 0.0), one, np.inf)
         for one in (depth_m[at[:, 1], at[:, 0]] for at in (inner, outer))
     )
     nearer = np.minimum(here, there)
-    if np.count_nonzero(nearer < _FAR_M) < _LEAST_PAIRS:
+    if np.count_nonzero(nearer < np.inf) < _LEAST_PAIRS:
         return None
     jump_m = np.maximum(_JUMP_M, _JUMP_SHARE * nearer)
-    grows, shrinks = there - here > jump_m, here - there > jump_m
-    return float((grows.sum() - shrinks.sum()) / np.count_nonzero(nearer < _FAR_M))
+    grows, shrinks = there > here + jump_m, here > there + jump_m
+    return float((grows.sum() - shrinks.sum()) / np.count_nonzero(nearer < np.inf))
 
 
 def _pairs(silhouette: Silhouette) -> tuple[NDArray[np.int64], NDArray[np.int64]]:

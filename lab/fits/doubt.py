@@ -37,7 +37,6 @@ from cardbox_tracker.search.doubt import (
     KINDS,
     LOST_FROM,
     STAYS_SURE,
-    WHOLE_UNCERTAIN_FROM,
     Source,
     evidence_of_image,
     remembered,
@@ -225,7 +224,7 @@ def doubts(said: FloatArray) -> FloatArray:
     found = hands = hands_over_time(said)
     if said.shape[1] > len(MODELED):
         found = np.where(hands > HIGHEST, 1.0, said[:, -1])
-    return np.where(said[:, 6] <= WHOLE_UNCERTAIN_FROM, found, 1.0)
+    return np.where(said[:, 6] <= LOST_FROM, found, 1.0)
 
 
 def thresholds_of(

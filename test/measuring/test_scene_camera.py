@@ -259,8 +259,15 @@ def test_a_camera_that_moves_is_told() -> None:
     people = [film(WALK, 8.0)]
     noise = np.random.default_rng(1).integers(0, 255, (60, 80)).astype(np.uint8)
     room = cv2.resize(noise, (640, 480), interpolation=cv2.INTER_CUBIC)
-    for shift_px, moves in ((0, False), (15, True)):
-        pictures = [(10.0 * k, np.roll(room, shift_px * k, axis=1)) for k in range(4)]
+    # From one picture to the next: 1 % of the width counts, in more than a quarter of the pairs.
+    for shifts_px, moves in (
+        ((5, 5, 5, 5), False),
+        ((9, 9, 9, 9), True),
+        ((15, 0, 0, 0), False),
+        ((15, 15, 0, 0), True),
+    ):
+        places_px = np.cumsum((0, *shifts_px)).tolist()
+        pictures = [(10.0 * k, np.roll(room, px, axis=1)) for k, px in enumerate(places_px)]
         shown = scene_camera(people, pictures, CAMERA, [STATURE_M])
         assert any("camera does not stand still" in one for one in shown.remarks) is moves
         assert shown.moves is moves

@@ -20,15 +20,8 @@ from cardbox_tracker.person.posture import PLACE, POSTURE
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.tracking.estimate import (
-    CLOSED,
-    FILLED,
-    HAND_KEYPOINTS,
-    NO_PERSON,
-    OPEN,
-    UNCERTAIN,
-    Estimate,
-)
+from cardbox_tracker.search.doubt import HANDS
+from cardbox_tracker.tracking.estimate import CLOSED, FILLED, NO_PERSON, OPEN, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
 
 ImageArray = NDArray[np.uint8]
@@ -257,7 +250,7 @@ def _draw_gaze(canvas: ImageArray, camera: Camera, line_m: FloatArray) -> None:
 
 def _draw_hands(canvas: ImageArray, camera: Camera, estimate: Estimate) -> None:
     """Draw a ring around an open hand, a disc over a closed one, and a half disc between."""
-    for hand, keypoint in zip(estimate.hands or (), HAND_KEYPOINTS, strict=False):
+    for hand, keypoint in zip(estimate.hands or (), HANDS, strict=False):
         if hand is None or hand.open is None or estimate.keypoints_m is None:
             continue
         u, v = camera.project(estimate.keypoints_m[keypoint]).tolist()
