@@ -2,7 +2,7 @@
 
 A body that was not measured (:mod:`cardbox_tracker.person.proportions`) has unknown values: the
 height of the hips, the breadths of the person with clothes, and possibly the distance. They are
-estimated by an alternating search, which also uses the points of a detector:
+estimated by an alternating search, which uses the points of a detector for the distance:
 
 1. The whole-body filter searches for postures of the current body.
 2. Random bodies around the current one are rated in the best of these postures, with a prior
@@ -118,8 +118,8 @@ def fit_first_sight(
     """Estimate the unknown values of a body from one silhouette (H, W) of :func:`upper_body`.
 
     The ``image``, (H, W, 3) bgr or (H, W), of the same frame teaches the colours. Its ``points``
-    show the distance better than an outline with clothes does. Raises InitializationError if no
-    body stands where the silhouette is.
+    show a distance that is not given better than an outline with clothes does. Raises
+    InitializationError if no body stands where the silhouette is.
     """
     camera = camera.with_pitch(body.camera_pose.pitch_rad)
     found, posture, iou = _Search(body, camera, (silhouette, points), config, rng).run()
@@ -148,7 +148,9 @@ class _Search:
     ) -> None:
         self._prior, self._camera, (self._seen, self._points) = body, camera, seen
         terms = (one.build(body, camera) for one in config.terms if isinstance(one, JointPoints))
-        self._terms = [] if self._points is None else [*terms]
+        # Points that contradict a given distance would keep all bodies from the outline.
+        is_used = self._points is not None and "distance_m" in body.unknown
+        self._terms = [*terms] if is_used else []
         self._observed: tuple[TermObservation, ...] = ()
         # A broad person must not be taken for a near one.
         cost = replace(config.whole_body.cost, x_step_m=_X_STEP_M)

@@ -108,14 +108,15 @@ def test_points_show_the_distance_of_who_wears_wide_clothes() -> None:
     pixels = CAMERA.project(CAMERA.reference_to_optical(joints_m))
     points = ImagePoints.of({name: (*at, 0.9) for name, at in zip(names, pixels, strict=True)})
     outline = silhouette(body.with_values(distance_m=1.8))
-    alone_m, found_m = (
-        first_sight.fit_first_sight(
-            *(body_from_proportions(1.75), CAMERA, outline, None, default_preset()),
-            *(np.random.default_rng(0), given),
-        ).body.placement.distance_m
-        for given in (None, points)
-    )
+
+    def fitted(guess: BodyModel, given: ImagePoints | None) -> BodyModel:
+        more = CAMERA, outline, None, default_preset(), np.random.default_rng(0), given
+        return first_sight.fit_first_sight(guess, *more).body
+
+    guess, known = body_from_proportions(1.75), body_from_proportions(1.75, 1.8)
+    alone_m, found_m = (fitted(guess, one).placement.distance_m for one in (None, points))
     assert 1.75 < alone_m < found_m - 0.03 < 2.0
+    assert fitted(known, points) == fitted(known, None)
 
 
 def test_what_was_given_is_kept() -> None:
