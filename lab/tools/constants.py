@@ -117,7 +117,7 @@ def tracked(case: str, options: Any, change: tuple[str, str], seed: int) -> tupl
     """
     module, name = change
     if name:
-        before = getattr(sys.modules[module], name)
+        before = getattr(import_module(module), name)
         for one in [one for one in sys.modules.values() if vars(one).get(name) is before]:
             setattr(one, name, changed(before))
     codes = set[CodeType]()
@@ -154,7 +154,7 @@ def compared(before: Any, now: Any) -> str:
 
 
 def _apart(case: str, options: Any, change: tuple[str, str] = ("", ""), seed: int = 0) -> Any:
-    with multiprocessing.get_context("fork").Pool(1) as pool:
+    with multiprocessing.get_context("spawn").Pool(1) as pool:
         return pool.apply(tracked, (case, options, change, seed))
 
 
