@@ -26,7 +26,7 @@ from cardbox_tracker.common.array_checks import ANY, check_array
 from cardbox_tracker.common.settings import settings_or
 from cardbox_tracker.segmentation.absorption import Absorber
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.chroma import DARKEST, SAMPLES, ChromaScore, colors_of
+from cardbox_tracker.segmentation.chroma import DARKEST, ChromaScore, colors_of
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LEAST_LEVEL, LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
@@ -81,6 +81,8 @@ _LEAST_COLOR_CONTRAST, _COLOR_EDGE = 7.0, 0.45
 _DARKEST_SHADOW = 0.4
 # Largest change of the brightness of the whole scene that is compensated if light is not followed.
 _FLICKER = 0.1
+# Number of pixels whose median estimates the brightness of the scene.
+_BRIGHTNESS_SAMPLES = 1000
 # Margin around the foreground, and around the part that is compared by colour.
 _MARGIN_PX = 8
 # One image in this many is compared by colour everywhere, not only near the foreground.
@@ -94,7 +96,7 @@ class SilhouetteExtractor:
         """Prepare the thresholds of every pixel."""
         self.config = config = settings_or(BackgroundConfig(), config)
         self.gain = 1.0
-        step = max(1, math.isqrt(model.mean.size // SAMPLES))
+        step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
         self._grid = (slice(None, None, step), slice(None, None, step))
         self._light: LightFollower | None = None
         self._chroma: ChromaScore | None = None

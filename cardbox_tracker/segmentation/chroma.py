@@ -27,13 +27,12 @@ _NEUTRAL = 128.0
 DARKEST = 8.0
 """Relative differences are noise where the scene is darker than this, grey levels."""
 _RATIOS = (0.2, 1.6)
-CUT_OFF = 245.0
-"""A channel above this may be saturated, so the pixel may be brighter and of another colour."""
+# A channel above this may be saturated, which changes the colour.
+_CUT_OFF = 245.0
 # Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
-SAMPLES = 1200
-"""Number of pixels whose medians estimate the white balance, or the brightness, of a scene."""
-# Largest change of the white balance.
+# Number of pixels whose medians estimate the white balance, and its largest change.
+_SAMPLES = 1200
 _STRONGEST_CAST = 0.2
 
 
@@ -115,7 +114,7 @@ class ChromaScore:
         self._background = np.concatenate(planes).astype(np.float32)
         self._edge = edge
         size = mean[0].size
-        step = max(1, round((size / SAMPLES) ** 0.5))
+        step = max(1, round((size / _SAMPLES) ** 0.5))
         self._grid = np.s_[:, step // 2 :: step, step // 2 :: step]
         self._follow = follow
         self._cast = 0.0, 0.0
@@ -165,7 +164,7 @@ class ChromaScore:
         red = (red - np.float32(_NEUTRAL) - ratio * mean_red - cast_red * level) * weight_red
         blue = (blue - np.float32(_NEUTRAL) - ratio * mean_blue - cast_blue * level) * weight_blue
         distance = np.sqrt(red * red + blue * blue)
-        score = np.where(ratio * brightest < np.float32(CUT_OFF), distance, np.float32(0))
+        score = np.where(ratio * brightest < np.float32(_CUT_OFF), distance, np.float32(0))
         # Within half of a JPEG chroma block.
         highest = np.asarray(cv2.dilate(score, SQUARE, iterations=3), np.float32)
         highest = highest.reshape(score.shape)

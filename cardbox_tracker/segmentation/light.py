@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.common.array_checks import ANY, check_array
-from cardbox_tracker.segmentation.chroma import CUT_OFF, DARKEST, bgr_of
+from cardbox_tracker.segmentation.chroma import DARKEST, bgr_of
 from cardbox_tracker.segmentation.regions import SQUARE, flooded
 from cardbox_tracker.segmentation.window import Window
 
@@ -23,12 +23,16 @@ ImageArray = NDArray[np.uint8]
 
 # Weight of the assumption of no change, as a share of a cell's pixels.
 _DOUBT = 0.02
+# A channel above this may be saturated, so the pixel may be brighter than it seems.
+_CUT_OFF = 250.0
 # The light is estimated from every fourth pixel of every fourth row.
 _GRID = (slice(1, None, 4), slice(1, None, 4))
 # Columns and rows of the cells of the coarse field, and the Gaussian that smooths them, with a
 # standard deviation of two cells.
 _CELLS = (20, 15)
 _GAUSSIAN = cv2.getGaussianKernel(17, 2.0, cv2.CV_32F)
+# A field within this of 1 is ignored.
+_SAME = 0.004
 # Weights of blue, green and red in the brightness.
 _WEIGHTS = np.array([0.114, 0.587, 0.299], np.float32)
 # The field is estimated in every third image, and in every one after a step; the level always.
@@ -121,6 +125,7 @@ class LightFollower:
         self._brightness = np.zeros(self._mean.shape, np.uint8)
         self._started = False
         self._images = 0
+        self._extremes = 1.0, 1.0
         self._relative, self._highest_field = self._mean, 1.0
 
     def expect_step(self) -> None:
@@ -134,7 +139,7 @@ class LightFollower:
         """
         check_array("brightness", brightness, self._mean.shape)
         self._estimate(brightness)
-        if self.level * self._highest_field * self._highest < CUT_OFF:
+        if self.level * self._highest_field * self._highest < _CUT_OFF:
             return self._relative, self.level
         self._cut_off()
         return self._now, 1.0
@@ -146,7 +151,7 @@ class LightFollower:
 
     def _cut_off(self) -> None:
         """Compute the expected brightness, limited to the range of the camera's channels."""
-        limit = np.float32(CUT_OFF / (self.level * self._highest_field))
+        limit = np.float32(_CUT_OFF / (self.level * self._highest_field))
         weights = _WEIGHTS if len(self._channels) == 3 else (1.0,)
         np.multiply(self._relative, np.float32(self.level), out=self._now)
         now, mean = self._now.reshape(-1), self._mean.reshape(-1)
@@ -184,6 +189,7 @@ class LightFollower:
         # Cells without known pixels do not change.
         goal = self._base * (1.0 + cells[..., 0] / (cells[..., 1] + np.float32(_DOUBT)))
         self._field += np.float32(rate) * (goal - self._field)
+        self._extremes = float(self._field.min()), float(self._field.max())
         if self._is_lit:
             # The next estimate is relative to this one and adds the remainder of the smoothing.
             self._base = self._field.copy()
@@ -200,7 +206,7 @@ class LightFollower:
         ratios = self._samples / np.maximum(self._small, np.float32(1))
         with np.errstate(invalid="ignore"):
             highest = ratios * self._small_brightest
-        known, outside = highest < CUT_OFF, self._person == 0
+        known, outside = highest < _CUT_OFF, self._person == 0
         bright = outside & (highest < np.inf)
         enough = _ENOUGH * known.size
         if np.count_nonzero(known & outside) >= enough:
@@ -223,7 +229,7 @@ class LightFollower:
         relative = ratios / np.float32(self.level)
         change = relative / around - np.float32(1)
         with np.errstate(invalid="ignore"):
-            is_cut_off = ratios * self._small_brightest >= CUT_OFF
+            is_cut_off = ratios * self._small_brightest >= _CUT_OFF
         # A saturated pixel gives only a lower bound.
         is_known = ~is_cut_off | ((change > 0) & (self._small_brightest < np.inf))
         is_used = (person == 0) & is_known & (np.abs(change) < np.float32(tolerance))
@@ -237,7 +243,10 @@ class LightFollower:
 
     def _spread(self) -> None:
         """Multiply the background by the field, interpolated between cells."""
-        self._highest_field = float(self._field.max())
+        lowest, self._highest_field = self._extremes
+        if self._highest_field < 1.0 + _SAME and lowest > 1.0 - _SAME:
+            self._relative = self._mean
+            return
         field = cv2.resize(self._field, self._mean.shape[::-1])
         np.multiply(self._mean, field, out=self._scaled)
         self._relative = self._scaled
