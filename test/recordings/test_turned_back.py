@@ -217,8 +217,6 @@ def test_track_gives_the_same_for_a_film_that_shakes(
         for film in (write_film(tmp_path / "still", moves=False), shaken)
     )
     assert "turned back into the view of the first" in capsys.readouterr().err
-    names = [
-        (f"{hand}_{axis}", f"{hand}_z") for hand in ("left_hand", "right_hand") for axis in "xy"
-    ]
-    rays, moved_rays = ([one[k] / one[z] for k, z in names] for one in (still, moved))
-    assert np.median(np.abs(np.subtract(rays, moved_rays))) < 0.005
+    names = [f"{side}_hand_{axis}" for side in ("left", "right") for axis in "xyz"]
+    away_m = np.abs(still[names].to_numpy() - moved[names].to_numpy())
+    assert np.median(away_m) < 0.02
