@@ -45,7 +45,7 @@ from cardbox_tracker.person.legs import leg_angles
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
-from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, stature_of
+from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, THIGH_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
 from cardbox_tracker.terms.joint_points import POINT_PX
@@ -69,8 +69,10 @@ _KNEES = [3, 7]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
-# Lengths of thigh and shank, and height of the ankle, by where detectors mark them.
-_MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
+# Height of the ankle, and lengths of thigh and shank. Detectors mark knees and ankles there, but
+# the hip below the joint, where the thigh begins.
+_ANKLE_SHARE = float(MARKED_HEIGHTS[5])
+_BONES = np.array([THIGH_SHARE, MARKED_HEIGHTS[4] - _ANKLE_SHARE])
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
 _BORDER = 0.005
 # Deviation of the points of knee and ankle, m; how much larger that of an unseen one is.
@@ -134,7 +136,7 @@ class LegReader:
         self._body, self._camera = body, camera
         self.forget()
         self._stature_m = stature_of(body_parts(body.sizes))
-        lengths_m = (_MARKED.sum() + _ANKLE_SHARE) * self._stature_m
+        lengths_m = (_BONES.sum() + _ANKLE_SHARE) * self._stature_m
         self._usual = np.array([0.0, 0.0, body.placement.hip_height_m - lengths_m, 0.0])
         self._usual_stddev = np.array([_LENGTH, _LENGTH, _FLOOR_M, _DISTANCE_SHARE])
         stands = body.camera_pose
@@ -254,7 +256,7 @@ class _Fit:
         self.px_per_m = camera.fx / max(float(camera.reference_to_optical(self.hip_m)[2]), 0.3)
         self._turn = rotation_z(np.asarray(estimate.posture[YAW]))
         self._aside = self._turn[:, 1] * HIP_SHARE * stature_m
-        self._lengths_m, ankle_m = _MARKED * stature_m, _ANKLE_SHARE * stature_m
+        self._lengths_m, ankle_m = _BONES * stature_m, _ANKLE_SHARE * stature_m
         self.person = self.hip_m, self._aside, self._turn, self._lengths_m, ankle_m
         lens = float(camera.fx), float(camera.fy), float(camera.cx), float(camera.cy)
         self._view = camera.reference_to_optical_rotation(), lens

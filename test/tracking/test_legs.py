@@ -35,10 +35,10 @@ BODY = body_from_proportions(1.75, 3.0, hip_height_m=-0.5, camera_pitch_rad=PITC
 STATURE_M = stature_of(body_parts(BODY.sizes))
 # The middle of the mass is 5 cm ahead of the ankles.
 STANDING = np.radians([-2.0, 4.0, 0.0, 4.0] * 2)
-SQUATTING = np.radians([75.0, 10.0, 0.0, 105.0] * 2)
+SQUATTING = np.radians([71.0, 10.0, 0.0, 105.0] * 2)
 SITTING = np.radians([85.0, 10.0, 0.0, 88.0, 85.0, 8.0, 0.0, 88.0])
 # Thigh and shank between the points that detectors mark.
-THIGH_SHARE, SHANK_SHARE = 0.224, 0.220
+THIGH_SHARE, SHANK_SHARE = 0.245, 0.220
 # The detector's slope of a bone whose true slope is known, see the fit.
 FACTORS, OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
 NO_ERROR = np.zeros(2)
