@@ -63,8 +63,7 @@ _TRUNK = [
 ]
 # How much higher MediaPipe marks the hips where no feet are in the image.
 _HIP_ALONE = 0.022
-# Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
-_LEANS = np.radians((0.5, 2.0, 0.0))
+# Leans of legs, trunk and aside of a person, rad: deviations among people and images.
 _LEAN_STDDEVS = np.radians((3.0, 4.0, 2.0))
 # How far the hips of an image are lowered: legs that are seen straight, and others.
 _STRAIGHT, _OTHER_LEGS = 0.008, 0.08
@@ -73,8 +72,8 @@ _STRAIGHT, _OTHER_LEGS = 0.008, 0.08
 _STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
 # An image counts if hips and knees bend at most this much more, rad, than in this share of all.
 _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
-# Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
-_SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
+# Deviations of a level in an image, aside and along the body.
+_SIDE, _ALONG = 0.02, 0.012
 # A trunk that leans more in space is not upright. Knees that bend more are not straight, rad.
 # Somebody who is seen from above seems to lean, but not against the own legs: there, the trunk of
 # who stands leans less than the last value.
@@ -177,8 +176,8 @@ def people_camera(
     usual_m = float(np.exp(statures.mean()))
     camera_mean = np.array([pitch[0], roll[0], 0.85 * usual_m, 0.0])
     camera_stddev = np.array([pitch[1], roll[1], 0.6 * usual_m, camera.focal_stddev])
-    levels = np.zeros(2 * len(LEVELS))
-    of_people = np.array([[one, *levels, *_LEANS] for one in statures])
+    of_people = np.zeros((len(statures), _OF_PERSON))
+    of_people[:, 0] = statures
     spread = (*_HEIGHT_STDDEVS, *_FORWARD_STDDEVS, *_LEAN_STDDEVS)
     of_people_stddev = np.array([[one, *spread] for one in unsure])
     for number in range(len(statures)):
@@ -324,7 +323,6 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
     times_s, px, known, faces, straight, _ = (np.array(one) for one in zip(*rows, strict=True))
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
-    stddevs[~straight, _ANKLE] *= _STEPPING / _ALONG
     independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
@@ -382,10 +380,7 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, floa
     length = max(float(np.hypot(across[0], across[2])), 1e-6)
     facing = float(across[2] / length), float(across[0] / length)
     trunk = shoulders.sum(axis=0) - hips.sum(axis=0)
-    elbows = there[[POINT_INDEX["left_elbow"], POINT_INDEX["right_elbow"]]]
-    # Who raises an arm raises the shoulder, too.
-    is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
-    is_bowed |= float(np.hypot(trunk[0], trunk[2])) > np.tan(_BOWED) * -float(trunk[1])
+    is_bowed = math.hypot(trunk[0], trunk[2]) > math.tan(_BOWED) * -float(trunk[1])
     if points.legs is None or points.legs.spatial_m is None:
         return facing, is_bowed, False, math.nan, False
     knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
