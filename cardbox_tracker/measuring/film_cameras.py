@@ -80,9 +80,9 @@ _MOVING = 4.0
 _MOST_OFFSETS, _APART_S, _SURE, _CLEAR = 2, 0.2, 1.2, 1.6
 # Images of each person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
-# Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
-# on the far side of the body, which it hides, are this many times less sure.
-_COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
+# Deviations of points, and of bones in an image, statures. Joints on the far side of the body,
+# which it hides, are this many times less sure.
+_POINT, _BONE, _HIDDEN = 0.008, 0.01, 10.0
 _FACE, _EARS = slice(0, 3), slice(3, 5)
 # How much further than its partner of the other side a joint is if the body hides it, m.
 _FAR_SIDE_M = 0.25
@@ -249,9 +249,9 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
         films, [one.who for one in alone], rows[:, _OFFSET].tolist(), tall_m, _MOST_IMAGES
     )
     fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
-    whole, solution = fit.run(rows.ravel(), _POINT)
+    whole, solution = fit.run(rows.ravel())
     covariance = np.linalg.inv(solution.information[0])
-    halves = [fit.half(k).run(whole, _POINT)[0] for k in range(2)]
+    halves = [fit.half(k).run(whole)[0] for k in range(2)]
     return [
         _camera(
             film.name,
@@ -315,7 +315,7 @@ def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
         limits = offset_s - within_s, offset_s + within_s
         fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
         for start in _starts(first, film, who, offset_s, tall_m):
-            values, found = fit.run(start, _COARSE)
+            values, found = fit.run(start)
             cost = float(found.total[0]) / fit.count(values)
             if cost < least:
                 best, least = _Alone(values[:_OF_CAMERA], limits, who, is_clear), cost
@@ -533,18 +533,15 @@ class _Fit:
             parts.append(one._replace(times_s=half))
         return _Fit(parts, self._fixed, self._offsets_s)
 
-    def run(self, start: FloatArray, point: float) -> tuple[FloatArray, Solution]:
-        """Return the unknowns with the least cost near those of the films, or near all, (n,).
-
-        ``point`` is the deviation of a point, statures.
-        """
+    def run(self, start: FloatArray) -> tuple[FloatArray, Solution]:
+        """Return the unknowns with the least cost near those of the films, or near all, (n,)."""
         lengths = [np.log(one.stature_m * _PRIORS[:, 0]) for one in self._moments]
         mean = np.concatenate([start[: self._fixed.size], *lengths])
         values = np.append(start, mean[len(start) :])
         given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
         inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
         for person in self._people:
-            person.scale(values, point)
+            person.scale(values)
         low, high = np.full(len(mean), -np.inf), np.full(len(mean), np.inf)
         at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
         low[at], high[at] = self._offsets_s
@@ -574,11 +571,10 @@ class _Person:
         self._own = [*range(films), *range(first, first + len(_PRIORS))]
         self._scale: FloatArray = np.ones(1)
 
-    def scale(self, unknowns: FloatArray, point: float) -> None:
+    def scale(self, unknowns: FloatArray) -> None:
         """Take the inverse deviations of rays from distances at unknowns.
 
-        They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
-        is the deviation of a point, statures.
+        They stay while the unknowns change: otherwise a smaller scene would fit better.
         """
         at = self._at(unknowns)
         sure, depth_m = at.sure, _before(at, _triangulated(at))[..., 2]
@@ -586,7 +582,7 @@ class _Person:
         count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
         far_m = np.where(count > 0, far_m, 1.0)
-        self._scale = far_m[..., None, None] / (point * self._moments.stature_m)
+        self._scale = far_m[..., None, None] / (_POINT * self._moments.stature_m)
 
     def count(self, unknowns: FloatArray) -> float:
         """Return the number of residuals, each with its weight."""
