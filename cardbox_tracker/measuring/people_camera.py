@@ -380,7 +380,10 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, floa
     length = max(float(np.hypot(across[0], across[2])), 1e-6)
     facing = float(across[2] / length), float(across[0] / length)
     trunk = shoulders.sum(axis=0) - hips.sum(axis=0)
-    is_bowed = math.hypot(trunk[0], trunk[2]) > math.tan(_BOWED) * -float(trunk[1])
+    elbows = there[[POINT_INDEX["left_elbow"], POINT_INDEX["right_elbow"]]]
+    # Who raises an arm raises the shoulder, too.
+    is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
+    is_bowed |= math.hypot(trunk[0], trunk[2]) > math.tan(_BOWED) * -float(trunk[1])
     if points.legs is None or points.legs.spatial_m is None:
         return facing, is_bowed, False, math.nan, False
     knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
