@@ -31,9 +31,8 @@ _RATIOS = (0.2, 1.6)
 _CUT_OFF = 245.0
 # Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
-# Number of pixels whose medians estimate the white balance, and its largest change.
+# Number of pixels whose medians estimate the white balance.
 _SAMPLES = 1200
-_STRONGEST_CAST = 0.2
 
 
 class ChromaModel(NamedTuple):
@@ -188,5 +187,4 @@ class ChromaScore:
         shares = [(one - np.float32(_NEUTRAL) - ratio * mean) / least for one, mean in parts]
         middle = shares[0].size // 2
         medians = [np.partition(one, middle, axis=None)[middle] for one in shares]
-        red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST)
-        self._cast = float(red), float(blue)
+        self._cast = float(medians[0]), float(medians[1])
