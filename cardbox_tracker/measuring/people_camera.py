@@ -72,8 +72,8 @@ _STRAIGHT, _OTHER_LEGS = 0.008, 0.08
 _STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
 # An image counts if hips and knees bend at most this much more, rad, than in this share of all.
 _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
-# Deviation of a level in an image.
-_LEVEL = 0.012
+# Deviations of a level in an image, aside and along the body.
+_SIDE, _ALONG = 0.02, 0.012
 # A trunk that leans more in space is not upright. Knees that bend more are not straight, rad.
 # Somebody who is seen from above seems to lean, but not against the own legs: there, the trunk of
 # who stands leans less than the last value.
@@ -322,7 +322,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         rows = [row for row in rows if not row[-1] > most]
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
     times_s, px, known, faces, straight, _ = (np.array(one) for one in zip(*rows, strict=True))
-    stddevs = np.repeat(np.where(known, _LEVEL, np.inf)[..., None], 2, axis=-1)
+    stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
     independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
