@@ -78,7 +78,7 @@ _SIDE, _ALONG = 0.02, 0.012
 # Somebody who is seen from above seems to lean, but not against the own legs: there, the trunk of
 # who stands leans less than the last value.
 _BOWED, _BENT, _LEANS_FORWARD = np.radians((50.0, 35.0, 20.0))
-_LEAST_LEVELS, _BORDER = 3, 0.02
+_BORDER = 0.02
 # How far people go in a second before they are first seen upright, m.
 _GOES_M = 0.1
 # Images of one person that count, and the time in which people keep posture and errors, s.
@@ -312,7 +312,7 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         is_bowed |= leans and bool(known[[_KNEE, _ANKLE]].all())
         is_straight = is_straight and bool(known[_KNEE])
         known[_KNEE] &= is_straight
-        if not is_bowed and known[[_SHOULDER, _HIP]].all() and known.sum() >= _LEAST_LEVELS:
+        if not is_bowed and known[[_SHOULDER, _HIP]].all():
             rows.append((time_s, px, known, facing, is_straight, bend))
     if not rows:
         return None
