@@ -44,7 +44,6 @@ _POINT_PX = 4.0
 STATE_STDDEV = np.array([0.3, 0.3, 0.3, 0.5, *[0.5] * 8, 0.3, 0.3])
 # Steps of the central differences by the pose.
 _POSE_STEP = np.array([0.015, 0.015, 0.015, 0.03, 0.03, 0.03])
-_MOST_STATE_CHANGE, _MOST_POSE_CHANGE = 0.25, 0.1
 
 
 class Sighting(NamedTuple):
@@ -115,7 +114,6 @@ class PoseProblem:
             inverse=self._stddevs**-2.0,
             low=-limit,
             high=limit,
-            largest=np.where(is_pose, _MOST_POSE_CHANGE, _MOST_STATE_CHANGE),
         )
         residuals = {"outlines": self._outlines}
         if self._tangents is not None:

@@ -21,7 +21,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import NEAREST_M, Camera
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.camera.extrinsics import angle_of
 from cardbox_tracker.person.sizes import FloatArray
@@ -44,8 +44,8 @@ _SLOPE, _FOR_ONE, _TOGETHER = 3.0, 20, 8.0
 _AGREES, _LEAST_SHARE, _MOST_STDDEV = 0.003, 0.7, np.radians(0.15)
 # Steps with each blur, and the rotation below which another one is not worth it, rad.
 _STEPS, _SMALL = 12, np.radians(0.005)
-# Least deviation of grey values; least depth of a direction that can be in the image.
-_NOISE, _LEAST_AHEAD = 2.0, 0.1
+# Least deviation of grey values.
+_NOISE = 2.0
 # Parts of the map that images have shown, and in which edges were sought.
 _SHOWN, _SOUGHT = 1, 2
 # Share of images without a rotation from which on the camera is not followed.
@@ -241,7 +241,7 @@ class _Map:
             layers = np.dstack([level, *_slopes(level), inside]).astype(np.float32)
             for _ in range(_STEPS):
                 local = self._rays @ back
-                px = camera.project(np.maximum(local, (-np.inf, -np.inf, _LEAST_AHEAD)))
+                px = camera.project(np.maximum(local, (-np.inf, -np.inf, NEAREST_M)))
                 counts = np.flatnonzero(((px > 0) & (px < last)).all(axis=1))
                 if not len(counts):
                     return None

@@ -75,14 +75,14 @@ _PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
 _SMOOTH_S, _MOST_SPEED = 0.07, 3.0
 # Movements of arms, legs and trunk that are independent.
 _MOVING = 4.0
-# Offsets that are tried, and the time between them, s; how surely speeds agree there, in what
+# How far the offset may be from that of the speeds, s; how surely speeds agree there, in what
 # chance gives, and from where on nobody needs to look.
-_MOST_OFFSETS, _APART_S, _SURE, _CLEAR = 2, 0.2, 1.2, 1.6
+_WITHIN_S, _SURE, _CLEAR = 0.1, 1.2, 1.6
 # Images of each person that count, and the time in which people keep posture and errors, s.
 _MOST_IMAGES, _COARSE_IMAGES, _SAME_S = 60, 15, 0.5
-# Deviations of points in the first and the second fit, and of bones in an image, statures. Joints
-# on the far side of the body, which it hides, are this many times less sure.
-_COARSE, _POINT, _BONE, _HIDDEN = 0.03, 0.008, 0.01, 10.0
+# Deviations of points, and of bones in an image, statures. Joints on the far side of the body,
+# which it hides, are this many times less sure.
+_POINT, _BONE, _HIDDEN = 0.008, 0.01, 10.0
 _FACE, _EARS = slice(0, 3), slice(3, 5)
 # How much further than its partner of the other side a joint is if the body hides it, m.
 _FAR_SIDE_M = 0.25
@@ -249,9 +249,9 @@ def film_cameras(films: Sequence[Film], statures_m: Sequence[float]) -> list[Fil
         films, [one.who for one in alone], rows[:, _OFFSET].tolist(), tall_m, _MOST_IMAGES
     )
     fit = _Fit(moments, fixed, np.array([one.offsets_s for one in alone]).T)
-    whole, solution = fit.run(rows.ravel(), _POINT)
+    whole, solution = fit.run(rows.ravel())
     covariance = np.linalg.inv(solution.information[0])
-    halves = [fit.half(k).run(whole, _POINT)[0] for k in range(2)]
+    halves = [fit.half(k).run(whole)[0] for k in range(2)]
     return [
         _camera(
             film.name,
@@ -309,24 +309,20 @@ class _Alone(NamedTuple):
 
 
 def _alone(first: Film, film: Film, tall_m: Sequence[float]) -> _Alone:
-    best, least = None, math.inf
-    for offset_s, within_s, who, is_clear in _offsets(first, film):
-        moments = _moments((first, film), (who,), (offset_s,), tall_m, _COARSE_IMAGES)
-        limits = offset_s - within_s, offset_s + within_s
-        fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
-        for start in _starts(first, film, who, offset_s, tall_m):
-            values, found = fit.run(start, _COARSE)
-            cost = float(found.total[0]) / fit.count(values)
-            if cost < least:
-                best, least = _Alone(values[:_OF_CAMERA], limits, who, is_clear), cost
-    if best is None:
+    found = _offset(first, film)
+    starts = [] if found is None else [*_starts(first, film, found.who, found.offset_s, tall_m)]
+    if found is None or not starts:
         given = "give --offset if it is known" if film.offset_s is None else "check --offset"
         raise CameraError(
             f"{film.name} and {first.name} do not show the same people at one time, or not for "
             f"long enough: expected films of one scene that overlap by {LEAST_IMAGES} images with "
             f"a person in both; {given}, or track each film alone"
         )
-    return best
+    moments = _moments((first, film), (found.who,), (found.offset_s,), tall_m, _COARSE_IMAGES)
+    limits = found.offset_s - found.within_s, found.offset_s + found.within_s
+    fit = _Fit(moments, _is_given(film)[None], np.array(limits)[:, None])
+    values, _ = min(map(fit.run, starts), key=lambda one: float(one[1].total[0]))
+    return _Alone(values[:_OF_CAMERA], limits, found.who, found.is_clear)
 
 
 def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray]:
@@ -361,11 +357,22 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
     return lags + one.times_s[0] - other.times_s[0], sure
 
 
-def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]]:
-    """Yield likely offsets of a film, s, within which time they are, s, and who is who.
+class _Offset(NamedTuple):
+    """The likeliest offset of a film, s, within which time it is, s, and who is who.
 
-    Also whether the offset is given, or surely none of chance. Speeds of people whom one camera
-    sees from behind and above agree best up to 0.1 s beside the offset.
+    Also whether it is given, or surely none of chance.
+    """
+
+    offset_s: float
+    within_s: float
+    who: Who
+    is_clear: bool
+
+
+def _offset(first: Film, film: Film) -> _Offset | None:
+    """Return the likeliest offset of a film; None if speeds agree nowhere.
+
+    Speeds of people whom one camera sees from behind and above agree best up to 0.1 s beside it.
     """
     periods_s = [one.period_s for one in (*first.people, *film.people)]
     step_s = max(periods_s, default=1.0) / 2.0
@@ -379,7 +386,7 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
     for lags, sure in () if is_given else curves.values():
         peaks = 1 + np.flatnonzero((sure[1:-1] > sure[:-2]) & (sure[1:-1] >= sure[2:]))
         tried += lags[peaks[sure[peaks] > 0.0]].tolist()
-    found = list[tuple[float, float, Who]]()
+    found, best = None, 0.0 if is_given else _SURE
     for offset_s in tried:
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
@@ -387,17 +394,14 @@ def _offsets(first: Film, film: Film) -> Iterator[tuple[float, float, Who, bool]
         pairs = sorted(cheapest((OTHER - gains).tolist()).items(), key=lambda at: -gains[at])
         # Chance gives each of them its own.
         together = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
-        if together.max(initial=0.0) > (0.0 if is_given else _SURE):
+        if together.max(initial=0.0) > best:
             most = int(np.argmax(together))
+            best = float(together[most])
             same = dict(pairs[: most + 1])
             who = tuple(same.get(a) for a in range(len(first.people)))
-            found.append((float(together[most]), offset_s, who))
-    taken = list[float]()
-    for alike, offset_s, who in sorted(found, key=lambda one: -one[0]):
-        if len(taken) < _MOST_OFFSETS and all(abs(offset_s - one) > _APART_S for one in taken):
-            taken.append(offset_s)
-            within_s = 0.0 if is_given else max(step_s, _APART_S / 2.0)
-            yield offset_s, within_s, who, is_given or bool(alike > _CLEAR)
+            within_s = 0.0 if is_given else max(step_s, _WITHIN_S)
+            found = _Offset(offset_s, within_s, who, is_given or best > _CLEAR)
+    return found
 
 
 def _starts(
@@ -533,28 +537,21 @@ class _Fit:
             parts.append(one._replace(times_s=half))
         return _Fit(parts, self._fixed, self._offsets_s)
 
-    def run(self, start: FloatArray, point: float) -> tuple[FloatArray, Solution]:
-        """Return the unknowns with the least cost near those of the films, or near all, (n,).
-
-        ``point`` is the deviation of a point, statures.
-        """
+    def run(self, start: FloatArray) -> tuple[FloatArray, Solution]:
+        """Return the unknowns with the least cost near those of the films, or near all, (n,)."""
         lengths = [np.log(one.stature_m * _PRIORS[:, 0]) for one in self._moments]
         mean = np.concatenate([start[: self._fixed.size], *lengths])
         values = np.append(start, mean[len(start) :])
         given = np.where(self._fixed, _GIVEN**-2.0, 0.0).ravel()
         inverse = np.append(given, np.tile(_PRIORS[:, 1] ** -2.0, len(self._moments)))
         for person in self._people:
-            person.scale(values, point)
+            person.scale(values)
         low, high = np.full(len(mean), -np.inf), np.full(len(mean), np.inf)
         at = slice(_OFFSET, self._fixed.size, _OF_CAMERA)
         low[at], high[at] = self._offsets_s
         rules = rules_of(len(mean), mean=mean, inverse=inverse, low=low, high=high)
         found = minimize({"points": self._residuals}, values[None], rules, *_FIT_ENDS)
         return found.values[0], found
-
-    def count(self, unknowns: FloatArray) -> float:
-        """Return the number of residuals, each with its weight."""
-        return sum(person.count(unknowns) for person in self._people)
 
     def _residuals(self, values: FloatArray) -> Residuals:
         every = [person.residuals(values[0]) for person in self._people]
@@ -574,11 +571,10 @@ class _Person:
         self._own = [*range(films), *range(first, first + len(_PRIORS))]
         self._scale: FloatArray = np.ones(1)
 
-    def scale(self, unknowns: FloatArray, point: float) -> None:
+    def scale(self, unknowns: FloatArray) -> None:
         """Take the inverse deviations of rays from distances at unknowns.
 
-        They stay while the unknowns change: otherwise a smaller scene would fit better. ``point``
-        is the deviation of a point, statures.
+        They stay while the unknowns change: otherwise a smaller scene would fit better.
         """
         at = self._at(unknowns)
         sure, depth_m = at.sure, _before(at, _triangulated(at))[..., 2]
@@ -586,12 +582,7 @@ class _Person:
         count = is_seen.sum(axis=2)
         far_m = np.where(is_seen, depth_m, 0.0).sum(axis=2) / np.maximum(count, 1)
         far_m = np.where(count > 0, far_m, 1.0)
-        self._scale = far_m[..., None, None] / (point * self._moments.stature_m)
-
-    def count(self, unknowns: FloatArray) -> float:
-        """Return the number of residuals, each with its weight."""
-        at = self._at(unknowns)
-        return self._moments.weight * float(2 * (at.sure > 0.0).sum() + (at.bones > 0.0).sum())
+        self._scale = far_m[..., None, None] / (_POINT * self._moments.stature_m)
 
     def residuals(self, unknowns: FloatArray) -> Residuals:
         """Return residuals at the points (m, 25, 3) with the least cost for the unknowns (n,).

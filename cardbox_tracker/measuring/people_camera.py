@@ -63,29 +63,26 @@ _TRUNK = [
 ]
 # How much higher MediaPipe marks the hips where no feet are in the image.
 _HIP_ALONE = 0.022
-# Leans of legs, trunk and aside of a person, rad: means, and deviations among people and images.
-_LEANS = np.radians((0.5, 2.0, 0.0))
+# Leans of legs, trunk and aside of a person, rad: deviations among people and images.
 _LEAN_STDDEVS = np.radians((3.0, 4.0, 2.0))
-# Deviation of the trunk's lean of people whose straight legs are not seen, rad: some sit.
-_SITTING_LEAN = np.radians(8.0)
-# How far the hips of an image are lowered: legs that are seen straight, others, and who sits.
-_STRAIGHT, _OTHER_LEGS, _SEAT = 0.008, 0.08, 0.4
+# How far the hips of an image are lowered: legs that are seen straight, and others.
+_STRAIGHT, _OTHER_LEGS = 0.008, 0.08
 # Deviations of the height of what a person stands on, such as a box, and of a floor; images whose
 # height differs less than the last value from that of most images show the floor.
 _STEP_UP, _FLOOR, _ON_FLOOR = 0.1, 0.01, 0.045
 # An image counts if hips and knees bend at most this much more, rad, than in this share of all.
 _BENT_MORE, _STRAIGHTEST = np.radians(20.0), 0.1
-# Deviations of a level in an image, aside and along the body; of the ankles of bent legs.
-_SIDE, _ALONG, _STEPPING = 0.02, 0.012, 0.03
-# A trunk that leans more in space is not upright. Knees that bend more are not straight; who bends
-# the hips as much sits, rad. Somebody who is seen from above seems to lean, but not against the own
-# legs: there, the trunk of who stands leans less than the last value.
+# Deviations of a level in an image, aside and along the body.
+_SIDE, _ALONG = 0.02, 0.012
+# A trunk that leans more in space is not upright. Knees that bend more are not straight, rad.
+# Somebody who is seen from above seems to lean, but not against the own legs: there, the trunk of
+# who stands leans less than the last value.
 _BOWED, _BENT, _LEANS_FORWARD = np.radians((50.0, 35.0, 20.0))
-_LEAST_LEVELS, _BORDER = 3, 0.02
+_BORDER = 0.02
 # How far people go in a second before they are first seen upright, m.
 _GOES_M = 0.1
 # Images of one person that count, and the time in which people keep posture and errors, s.
-_MOST_IMAGES, _SAME_S, _SITTING_IMAGES = 24, 4.0, 3.0
+_MOST_IMAGES, _SAME_S = 24, 4.0
 _SHARED, _OF_PERSON, _OF_IMAGE = 4, 2 * len(LEVELS) + 4, 7
 
 
@@ -179,15 +176,12 @@ def people_camera(
     usual_m = float(np.exp(statures.mean()))
     camera_mean = np.array([pitch[0], roll[0], 0.85 * usual_m, 0.0])
     camera_stddev = np.array([pitch[1], roll[1], 0.6 * usual_m, camera.focal_stddev])
-    levels = np.zeros(2 * len(LEVELS))
-    of_people = np.array([[one, *levels, *_LEANS] for one in statures])
+    of_people = np.zeros((len(statures), _OF_PERSON))
+    of_people[:, 0] = statures
     spread = (*_HEIGHT_STDDEVS, *_FORWARD_STDDEVS, *_LEAN_STDDEVS)
     of_people_stddev = np.array([[one, *spread] for one in unsure])
     for number in range(len(statures)):
-        its = seen.person == number
-        if not (seen.lowered[its] < _OTHER_LEGS).any():
-            of_people_stddev[number, -2] = _SITTING_LEAN
-        if not known[its, _ANKLE].any():
+        if not known[seen.person == number, _ANKLE].any():
             of_people[number, 1 + _HIP] = _HIP_ALONE
     place = np.column_stack([seen.rays[:, _SHOULDER, 0] * distance, np.log(distance)])
     of_images = np.column_stack([place, np.zeros((images, 5))])
@@ -313,14 +307,13 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
             # Ankles are doubtful where heels or toes are cut off.
             feet = is_inside(points.legs.px[4:], camera) | (points.legs.scores[4:] <= 0.0)
             known[_ANKLE] &= bool(feet.all())
-        facing, is_bowed, leans, bend, is_straight, sits = _posture(points)
+        facing, is_bowed, leans, bend, is_straight = _posture(points)
         # The network guesses legs that are not in the image.
         is_bowed |= leans and bool(known[[_KNEE, _ANKLE]].all())
-        is_straight, sits = is_straight and bool(known[_KNEE]), sits and bool(known[_KNEE])
+        is_straight = is_straight and bool(known[_KNEE])
         known[_KNEE] &= is_straight
-        known[_ANKLE] &= not sits
-        if not is_bowed and known[[_SHOULDER, _HIP]].all() and known.sum() >= _LEAST_LEVELS:
-            rows.append((time_s, px, known, facing, is_straight, sits, bend))
+        if not is_bowed and known[[_SHOULDER, _HIP]].all():
+            rows.append((time_s, px, known, facing, is_straight, bend))
     if not rows:
         return None
     bends = [bend for *_, bend in rows if math.isfinite(bend)]
@@ -328,19 +321,14 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
         most = np.quantile(bends, _STRAIGHTEST) + _BENT_MORE
         rows = [row for row in rows if not row[-1] > most]
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
-    times_s, px, known, faces, straight, sitting, _ = (
-        np.array(one) for one in zip(*rows, strict=True)
-    )
+    times_s, px, known, faces, straight, _ = (np.array(one) for one in zip(*rows, strict=True))
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
-    stddevs[~straight, _ANKLE] *= _STEPPING / _ALONG
     independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)
-    if not straight.any():
-        independent = min(independent, _SITTING_IMAGES)
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
         stddevs,
         faces,
-        np.where(sitting, _SEAT, np.where(straight, _STRAIGHT, _OTHER_LEGS)),
+        np.where(straight, _STRAIGHT, _OTHER_LEGS),
         np.full(len(rows), independent / len(rows)),
         np.full(len(rows), float(number)),
         times_s,
@@ -378,16 +366,15 @@ def _levels(points: ImagePoints) -> tuple[FloatArray, NDArray[np.bool_]]:
     return px, known
 
 
-def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, float, bool, bool]:
+def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, float, bool]:
     """Return where a person faces, and how legs and trunk are.
 
-    That is: if they bow; if the trunk leans against the legs; the bend; if legs are straight; and
-    if they sit. The bend is that of the hips plus the mean one of the knees, rad; nan if legs are
-    unknown.
+    That is: if they bow; if the trunk leans against the legs; the bend; and if legs are straight.
+    The bend is that of the hips plus the mean one of the knees, rad; nan if legs are unknown.
     """
     there = points.spatial_m
     if there is None or not np.isfinite(there[_TRUNK]).all():
-        return (0.0, 1.0), False, False, math.nan, True, False
+        return (0.0, 1.0), False, False, math.nan, True
     shoulders, hips = there[_TRUNK].reshape(2, 2, 3)
     across = shoulders[0] - shoulders[1]
     length = max(float(np.hypot(across[0], across[2])), 1e-6)
@@ -396,16 +383,15 @@ def _posture(points: ImagePoints) -> tuple[tuple[float, float], bool, bool, floa
     elbows = there[[POINT_INDEX["left_elbow"], POINT_INDEX["right_elbow"]]]
     # Who raises an arm raises the shoulder, too.
     is_bowed = bool((elbows[:, 1] < shoulders[:, 1]).any())
-    is_bowed |= float(np.hypot(trunk[0], trunk[2])) > np.tan(_BOWED) * -float(trunk[1])
+    is_bowed |= math.hypot(trunk[0], trunk[2]) > math.tan(_BOWED) * -float(trunk[1])
     if points.legs is None or points.legs.spatial_m is None:
-        return facing, is_bowed, False, math.nan, False, False
+        return facing, is_bowed, False, math.nan, False
     knees, ankles = points.legs.spatial_m[0:2], points.legs.spatial_m[2:4]
     thighs, shanks = knees - hips, ankles - knees
     of_knees = [_angle(*pair) for pair in zip(thighs, shanks, strict=True)]
-    of_hips = _angle(thighs.sum(axis=0), -trunk)
-    bend = of_hips + sum(of_knees) / 2
+    bend = _angle(thighs.sum(axis=0), -trunk) + sum(of_knees) / 2
     leans = _angle(trunk, hips.sum(axis=0) - ankles.sum(axis=0)) > _LEANS_FORWARD
-    return facing, is_bowed, leans, bend, max(of_knees) < _BENT, of_hips > _BENT
+    return facing, is_bowed, leans, bend, max(of_knees) < _BENT
 
 
 def _angle(a: FloatArray, b: FloatArray) -> float:

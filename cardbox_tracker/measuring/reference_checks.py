@@ -52,9 +52,8 @@ the hips, and higher with arms raised by 40 degrees."""
 MAX_CROWN_SHIFT = 0.035
 """Largest change of the crown's height between references in spans."""
 
-# Heights in spans: the shoulder joints below the arms' axes; and below the joints the rows for
-# widths at the shoulders of `side`, and at armpits and wrists of `front`.
-_JOINT_BELOW_AXIS = 0.01
+# Heights in spans below the arms' axes: the rows for widths at the shoulders of `side`, and at
+# armpits and wrists of `front`.
 _SHOULDERS, _ARMPITS, _WRISTS = (0.02, 0.03, 0.04), (0.04, 0.05, 0.06), (0.21, 0.22, 0.23)
 
 
@@ -149,7 +148,7 @@ def _arms(view: _View) -> _Arms | None:
     span = left.tip_m - right.tip_m
     centre, half = (left.tip_m + right.tip_m) / 2.0, BREADTH_OF_SPAN * span / 2.0
     axis = (left.axis_m(centre + half) + right.axis_m(centre - half)) / 2.0
-    return _Arms(left, right, span, axis - _JOINT_BELOW_AXIS * span)
+    return _Arms(left, right, span, axis)
 
 
 def _problem_of_arms(view: _View, arms: _Arms) -> str:

@@ -3,7 +3,7 @@
 People who stand and walk show pitch, roll, height and focal length, and so do upright edges of the
 room for pitch and roll. Both are combined by Bayes' rule on a grid. Edges can be wrong as a whole,
 such as those of leaning things, so with some probability they mean nothing; then people, and what
-is usual, decide. In the same way people who lean aside show no roll.
+is usual, decide.
 """
 
 from __future__ import annotations
@@ -42,8 +42,6 @@ GIVEN_STDDEV = float(np.radians(0.5))
 """Standard deviation of a pitch or roll that is given, rad."""
 # Deviations of the roll of cameras that stand level, and of others; share of the others.
 _LEVEL, _ROLLED, _ROLLED_SHARE = np.radians(1.0), ROLL_PRIOR, 0.15
-# Chance that people lean aside in a whole film, if their feet are seen, and if not.
-_LEAN_ASIDE, _LEAN_ASIDE_CUT = 0.03, 0.1
 # Chance that edges mean nothing, and systematic error of those that do, steps of the grid.
 _MISLEADING, _SYSTEMATIC = 0.2, 1.5
 # Systematic error of a pitch that people show, rad.
@@ -156,12 +154,8 @@ def scene_camera(
         stddev = np.sqrt(np.diag(spread))
         share = spread[0, 1] / spread[1, 1]
         within = np.sqrt(spread[0, 0] - share * spread[0, 1])
-        upright = _normal(rolls, roll, stddev[1])
-        upright *= _normal(pitches, pitch + share * (rolls - roll), within)
-        # Somebody who leans aside as much as the camera could be rolled.
-        leaning = _normal(rolls, roll, _ROLLED) * _normal(pitches, pitch, stddev[0])
-        lean_aside = _LEAN_ASIDE if shown.shows_feet else _LEAN_ASIDE_CUT
-        chances = of_roll * ((1 - lean_aside) * upright + lean_aside * leaning)
+        chances = of_roll * _normal(rolls, roll, stddev[1])
+        chances *= _normal(pitches, pitch + share * (rolls - roll), within)
     # How much likelier the lines are than if they meant nothing.
     lines = np.exp(likelihoods - likelihoods.max())
     lines /= (lines * of_roll).sum() / of_roll.sum()

@@ -26,14 +26,12 @@ ImageArray = NDArray[np.uint8]
 _NEUTRAL = 128.0
 DARKEST = 8.0
 """Relative differences are noise where the scene is darker than this, grey levels."""
-_RATIOS = (0.2, 1.6)
 # A channel above this may be saturated, which changes the colour.
 _CUT_OFF = 245.0
 # Kernel of the mean filter, px at half the resolution.
 _SMOOTHING = (3, 3)
-# Number of pixels whose medians estimate the white balance, and its largest change.
+# Number of pixels whose medians estimate the white balance.
 _SAMPLES = 1200
-_STRONGEST_CAST = 0.2
 
 
 class ChromaModel(NamedTuple):
@@ -160,7 +158,7 @@ class ChromaScore:
         level, red, blue = _smooth(colors).astype(np.float32)
         inverse, mean_red, mean_blue, weight_red, weight_blue, brightest = background
         cast_red, cast_blue = map(np.float32, self._cast)
-        ratio = np.clip(level * inverse, np.float32(_RATIOS[0]), np.float32(_RATIOS[1]))
+        ratio = level * inverse
         red = (red - np.float32(_NEUTRAL) - ratio * mean_red - cast_red * level) * weight_red
         blue = (blue - np.float32(_NEUTRAL) - ratio * mean_blue - cast_blue * level) * weight_blue
         distance = np.sqrt(red * red + blue * blue)
@@ -188,5 +186,4 @@ class ChromaScore:
         shares = [(one - np.float32(_NEUTRAL) - ratio * mean) / least for one, mean in parts]
         middle = shares[0].size // 2
         medians = [np.partition(one, middle, axis=None)[middle] for one in shares]
-        red, blue = np.clip(medians, -_STRONGEST_CAST, _STRONGEST_CAST)
-        self._cast = float(red), float(blue)
+        self._cast = float(medians[0]), float(medians[1])

@@ -122,7 +122,7 @@ def test_equal_to_numpy(seed: int, shape: tuple[int, int], edge: float) -> None:
     mean = rng.uniform(0, 255, small).astype(np.float32)
     stddev = rng.uniform(0, 9, small).astype(np.float32)
     planes = chroma_planes(image).astype(np.float32)
-    ratio = np.clip(planes[0] / np.maximum(mean[0], 8), 0.2, 1.6)
+    ratio = planes[0] / np.maximum(mean[0], 8)
     apart = planes[1:] - 128 - ratio * (mean[1:] - 128)
     score = np.hypot(*(apart / np.maximum(2 * stddev[1:], 7)))
     brightest = cv2.dilate(bgr_of(mean).max(axis=0), np.ones((3, 3), np.uint8))
