@@ -67,7 +67,7 @@ class RatedStates:
 
 
 # Uniform numbers per arm, and per state.
-_OF_ARM, _OF_STATE = 3, 2
+_OF_ARM, _OF_STATE = 1, 2
 
 
 class Draws:
@@ -87,7 +87,7 @@ class Draws:
         self._uniforms = _Numbers(rng.random(uniforms))
 
     def for_arms(self) -> tuple[FloatArray, FloatArray]:
-        """Return normal numbers (N, 4) and uniform ones (N, 3) for N proposed arms of a side."""
+        """Return normal numbers (N, 4) and uniform ones (N, 1) for N proposed arms of a side."""
         count = self._arms
         return self._normals.take(count, ARM_ANGLES), self._uniforms.take(count, _OF_ARM)
 

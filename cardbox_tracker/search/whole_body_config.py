@@ -25,7 +25,6 @@ _LEAST_PARTS = MappingProxyType(
         "fresh_torsos": 0,
         "best_torsos": 1,
         "arm_mirrors": 0,
-        "arm_tips": 0,
         "banked_arms": 0,
         "best_arms": 1,
         "paired_arms": 1,
@@ -55,8 +54,6 @@ class SearchProfile:
     #: cameras propose four times as many arms and rate a quarter of them.
     candidates: int = 3
     arm_mirrors: int = 8  #: number of the arms that are survivors mirrored in depth
-    #: number of the arms that reach for foreground that the model leaves uncovered.
-    arm_tips: int = 10
     banked_arms: int = 20  #: number of the arms that are drawn from the learned prior
     best_arms: int = 15  #: best arms around which others are proposed
     arms_again: int = 51  #: arms that are proposed around the best ones
@@ -113,7 +110,6 @@ SEVERAL_CAMERAS = replace(
     candidates=4,
     arms=360,
     arm_mirrors=32,
-    arm_tips=40,
     banked_arms=80,
     best_arms=20,
     arms_again=120,
