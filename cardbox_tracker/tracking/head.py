@@ -77,8 +77,6 @@ _FARTHEST_M = 0.3
 _POINT_M, _POINT_PX = 0.010, 1.0
 # Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
-_STARTS = np.zeros((5, 6))
-_STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
 _RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
 SMOOTHING_S, MOST_KEPT = 0.15, 0.5
@@ -175,7 +173,7 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 def _solve(given: _Given) -> Equations:
     """Return the equations of the best values from each start."""
     rows = given, 2 * given[3].shape[0], DIFFERENCE
-    return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, ENDS)
+    return minimize_compiled(_write_residuals, rows, np.zeros((1, 6)), _RULES, ENDS)
 
 
 def low_passed(before: FloatArray, values: FloatArray, interval_s: float) -> FloatArray:
