@@ -9,7 +9,7 @@ person's parts (``BodyModel.appearance``), and the term uses them in five steps:
 3. The gain of an arm is the mean ratio over its hand times the hand's area, plus the same for the
    forearm. The areas are those at the expected place of the person, so that neither short nor near
    limbs are preferred.
-4. A hand gains less where the other forearm covers it, and nothing behind the torso.
+4. A hand behind the torso gains nothing.
 5. Whether the forearms of a person without reference postures are bare is learned while tracking
    (:class:`Sleeves`).
 
@@ -112,7 +112,7 @@ class Sleeves:
         gains = ArmGains(maps, corner, self._weights, self._px_per_m, self._forearm_m)
         for arm in (0, 1):
             points, hidden = arms_in_image(posed, arm)
-            self.log_odds += float(gains(points, hidden, points)[0])
+            self.log_odds += float(gains(points, hidden)[0])
         self.log_odds = float(np.clip(self.log_odds, -_MOST, _MOST))
         return abs(self.bare - self._told) > _STEP
 
@@ -146,15 +146,10 @@ class ArmGains:
     px_per_m: float  #: scale at the expected place of the person
     forearm_m: tuple[float, float]  #: length, including the fist, and width of the forearm
 
-    def __call__(
-        self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
-    ) -> FloatArray:
-        """Return the gains (N,), px, of arms; ``points`` and ``hidden`` as :func:`arms_in_image`.
-
-        ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
-        """
+    def __call__(self, points: FloatArray, hidden: NDArray[np.bool_]) -> FloatArray:
+        """Return the gains (N,), px, of arms with the results of :func:`arms_in_image`."""
         gains = np.empty(len(points))
-        kernels.arm_gains(points, hidden, others, *self.arguments, gains)
+        kernels.arm_gains(points, hidden, *self.arguments, gains)
         return gains
 
     @cached_property
@@ -237,8 +232,7 @@ class InnerCueTerm:
         if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), before):
             self._use(self._sleeves)
         return InnerCueObservation(
-            ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m),
-            np.array([arms_in_image(before, arm)[0] for arm in (0, 1)]),
+            ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m)
         )
 
     def _comparable(self, image: Image) -> Image | None:
@@ -315,11 +309,9 @@ class InnerCueObservation(TermObservation):
     """The cue of one frame."""
 
     gains: ArmGains  #: gains of arms in this frame
-    before: FloatArray  #: elbow and hand of each arm in the previous frame, (2, 1, 2, 3)
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate the arms that count; the outline determines the trunk."""
         costs = np.zeros(len(posed.states))
-        of = posed.states, posed.parts, posed.body, self.before
-        costs_of_arms(*of, *self.gains.arguments, costs)
+        costs_of_arms(posed.states, posed.parts, posed.body, *self.gains.arguments, costs)
         return costs
