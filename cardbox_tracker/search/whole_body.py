@@ -219,7 +219,7 @@ class WholeBodyFilter:
         fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
         fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
-        upright = profile.fresh_torsos if is_settled else profile.torso_explorers
+        upright = profile.fresh_torsos
         noise = profile.noise()
         # The arms of a torso keep their angles.
         noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
@@ -227,7 +227,6 @@ class WholeBodyFilter:
             self._survivors,
             (noise, cost.limits, _lever_m(cost)),
             location.step_m,
-            profile.torso_explorers,
             (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
             search.draws.for_states(profile.torsos),
         )

@@ -21,7 +21,6 @@ _LEAST_TOTALS = MappingProxyType(
 _LEAST_PARTS = MappingProxyType(
     {
         "alike": 1,
-        "torso_explorers": 0,
         "fresh_torsos": 0,
         "best_torsos": 1,
         "arm_mirrors": 0,
@@ -43,10 +42,7 @@ class SearchProfile:
     alike: int = 12  #: survivors that may be similar; each other one differs from all better ones
     apart_m: float = 0.12  #: least distance of different survivors, m
     torsos: int = 70  #: torsos that are rated
-    torso_explorers: int = 16  #: number of the torsos that bow or turn by any angle
-    #: number of the torso_explorers that stand upright at the place of the silhouette; at first,
-    #: all of them do.
-    fresh_torsos: int = 8
+    fresh_torsos: int = 8  #: number of the torsos that stand upright at the silhouette's place
     #: best torsos that are rated with arms, both moved along and fixed in space.
     best_torsos: int = 12
     arms: int = 90  #: arms that are proposed per side

@@ -146,7 +146,6 @@ def test_torsos_that_turn_about_the_shoulders_leave_them_where_they_are() -> Non
         upright()[None],
         (sigma, STATE_LIMITS, lever_m),
         0.0,
-        0,
         (0, upright(), 0.0, 0.0, 2.0),
         (rng.standard_normal((20, 14)), rng.random((20, 2))),
     )
