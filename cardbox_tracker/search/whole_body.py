@@ -46,8 +46,8 @@ from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Posed, Term
 from cardbox_tracker.terms.whole_body import iou_of
 
-# Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
-_SETTLED_X_M, _YOUNG_X_M = 0.25, 0.5
+# Deviation of ``torso_x`` of upright torsos, m.
+_UPRIGHT_X_M = 0.25
 # Lateral step, m, after which the legs have left their last columns.
 _STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
@@ -215,10 +215,8 @@ class WholeBodyFilter:
         """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
         profile, cost, before = search.profile, self._cost, search.before
         location = search.location
-        is_settled = not self._is_new and self._age > doubt.SETTLED_FRAMES
         fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
-        fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
         upright = profile.fresh_torsos
         noise = profile.noise()
         # The arms of a torso keep their angles.
@@ -227,7 +225,7 @@ class WholeBodyFilter:
             self._survivors,
             (noise, cost.limits, _lever_m(cost)),
             location.step_m,
-            (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
+            (upright, fresh, _UPRIGHT_X_M, location.bearing, float(cost.place[0])),
             search.draws.for_states(profile.torsos),
         )
         ratings = cost.torsos(torsos, before)
