@@ -89,8 +89,6 @@ _FIXED = 1e-6
 # Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
 # arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
 _BALANCE_M, _UPPER_SHARE = 0.03, 0.626
-# Largest share of its length by which a trunk leans ahead.
-_MOST_LEAN = 0.7
 # Somebody stands who bends the knees by less, rad. Who bends them more, and has not moved the hips
 # by this distance, m, for this time, s, sits. A foot that is higher than the other one by this
 # distance is not on the floor.
@@ -319,7 +317,7 @@ class _Fit:
         """Return how far a trunk leans whose mass is balanced over legs (6, 3), rad."""
         upper_m = _UPPER_SHARE * np.linalg.norm(self._trunk_m)
         share = leg_fit.balanced_m(points_m, self._turn[:, 0]) / upper_m
-        return float(np.arcsin(np.clip(share, 0.0, _MOST_LEAN)))
+        return float(np.arcsin(np.clip(share, 0.0, 1.0)))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.
