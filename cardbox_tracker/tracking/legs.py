@@ -73,10 +73,10 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 _MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
 _BORDER = 0.005
-# Deviation of the points of knee and ankle, m; how much larger that of an unseen one is.
-_POINT_M, _UNSEEN = 0.025, 6.0
-# Deviations of the slopes of thigh and shank, and how much larger those of unseen ones are.
-_SLOPES, _UNSEEN_SLOPE = np.array([0.22, 0.12]), 1.5
+# Deviation of the points of knee and ankle, m.
+_POINT_M = 0.025
+# Deviations of the slopes of thigh and shank.
+_SLOPES = np.array([0.22, 0.12])
 # The true slopes as linear functions of the detector's: factors and offsets.
 _SLOPE_FACTORS, _SLOPE_OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
 # Change of an angle and its growth a second, rad.
@@ -276,16 +276,14 @@ class _Fit:
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
         is_seen = scores >= CERTAIN
-        sigma_px = np.hypot(POINT_PX, self.px_per_m * _POINT_M)
-        sigma_px = np.where(is_seen, sigma_px, _UNSEEN * sigma_px)
-        sigma_px = np.where(known, sigma_px, np.inf)
+        sigma_px = np.where(is_seen, np.hypot(POINT_PX, self.px_per_m * _POINT_M), np.inf)
         slopes = _UNKNOWN
         if points.spatial_m is not None and points.legs.spatial_m is not None:
             ends_m = points.legs.spatial_m[_ENDS]
             bones = np.diff(ends_m, axis=1, prepend=points.spatial_m[_HIPS][:, None])
             slopes = bones[..., 2] / np.maximum(np.linalg.norm(bones, axis=-1), 1e-6)
             slopes = _SLOPE_FACTORS * slopes + _SLOPE_OFFSETS
-        sigma_slopes = np.where(is_seen, _SLOPES, _UNSEEN_SLOPE * _SLOPES)
+        sigma_slopes = np.where(is_seen, _SLOPES, np.inf)
         hips = points.scores[_HIPS][:, None]
         scores = np.concatenate([hips, scores], axis=1)
         return _Seen(px, sigma_px, slopes, sigma_slopes, scores, points.px[_HIPS], shows_back)
