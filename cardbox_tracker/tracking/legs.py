@@ -71,8 +71,6 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
 # Lengths of thigh and shank, and height of the ankle, by where detectors mark them.
 _MARKED, _ANKLE_SHARE = -np.diff(MARKED_HEIGHTS[3:]), float(MARKED_HEIGHTS[5])
-# Width of the image's border, as a share of its longer side, where the detector guesses points.
-_BORDER = 0.005
 # Deviation of the points of knee and ankle, m.
 _POINT_M = 0.025
 # Deviations of the slopes of thigh and shank.
@@ -271,7 +269,7 @@ class _Fit:
         px, scores = points.legs.px[_ENDS], points.legs.scores[_ENDS]
         known = np.asarray(np.isfinite(px).all(axis=-1))
         # The detector guesses what is outside of the image, such as a foot that is cut off.
-        inside = is_inside(points.legs.px, self._camera, _BORDER) | (points.legs.scores <= 0.0)
+        inside = is_inside(points.legs.px, self._camera, 0.0) | (points.legs.scores <= 0.0)
         scores[:, 0] *= inside[:2]
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
