@@ -226,7 +226,7 @@ class WholeBodyFilter:
             (noise, cost.limits, _lever_m(cost)),
             location.step_m,
             (upright, fresh, _UPRIGHT_X_M, location.bearing, float(cost.place[0])),
-            search.draws.for_states(profile.torsos),
+            search.draws.for_torsos(profile.torsos),
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
@@ -280,7 +280,7 @@ class WholeBodyFilter:
         return self.refine(states, self._cues, prior, _FITTED_STEPS, _FITTED_DAMPING)[0]
 
     def together(self, search: Search) -> None:
-        """Move all joints of the best states together, and by the differences of others."""
+        """Move all joints of the best states together."""
         profile, rated = search.profile, self.rated
         sigma = profile.together_noise * profile.noise()
         sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
@@ -290,9 +290,7 @@ class WholeBodyFilter:
             moved = joint_moves.move_all(
                 sources,
                 (sigma, self._cost.limits, _lever_m(self._cost)),
-                int(profile.differing * profile.together),
-                profile.difference_scale,
-                search.draws.for_states(profile.together),
+                search.draws.for_moves(profile.together),
             )
             rated.add(moved)
             sigma = profile.round_decay * sigma

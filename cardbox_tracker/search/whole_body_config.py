@@ -56,10 +56,6 @@ class SearchProfile:
     paired_arms: int = 12  #: best arms of either side that are combined
     rounds: int = 2  #: rounds in which all joints move together
     together: int = 36  #: states in such a round
-    # Differences of survivors follow flat directions of the cost (Storn & Price,
-    # "Differential Evolution", 1997).
-    differing: float = 0.4  #: fraction of these states that move by the difference of two others
-    difference_scale: float = 0.6  #: factor on such a difference
     y_noise_m: float = 0.02  #: noise of the torso's y, m
     roll_noise_rad: float = 0.08  #: noise of the torso's roll, rad
     pitch_noise_rad: float = 0.08  #: noise of the torso's pitch, rad
@@ -109,7 +105,6 @@ SEVERAL_CAMERAS = replace(
     banked_arms=80,
     best_arms=20,
     arms_again=120,
-    differing=0.8,
     round_decay=0.8,
     smoothing=1.0 / 3.0,
 )
