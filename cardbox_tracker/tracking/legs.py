@@ -47,7 +47,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
 from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
+from cardbox_tracker.person.skeleton import LEG_LIMITS, LEG_NAMES, KeypointState, rotation_z
 from cardbox_tracker.terms.joint_points import POINT_PX
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
@@ -65,7 +65,7 @@ _ENDS = [
     for side in ("left", "right")
 ]
 # The bends of both knees among the angles.
-_KNEES = [3, 7]
+_KNEES = [LEG_NAMES.index(f"{side}_knee_flexion") for side in ("left", "right")]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
