@@ -48,8 +48,6 @@ from cardbox_tracker.terms.whole_body import iou_of
 
 # Deviation of ``torso_x`` of upright torsos, m.
 _UPRIGHT_X_M = 0.25
-# Lateral step, m, after which the legs have left their last columns.
-_STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
 _LOCATED_EFFORT = 0.25
 # States that are fitted to such cues: number, number of similar ones, least distance of the others,
@@ -172,11 +170,9 @@ class WholeBodyFilter:
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
             self._survivors = self.approach.with_upright(self._cost, frames, *given)
-        moved = self._survivors[0].copy()
-        moved[TORSO_Y] += location.step_m
-        if self._is_new or abs(location.step_m) > _STEP_M:
+        if self._is_new:
             # The pixels of the legs depend on the place of the person.
-            self._cost.see([frame.silhouette for frame in frames], moved)
+            self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
             self._cost.choose(self._seeing)
         self._age += not self._is_new
         for _ in range(passes):
