@@ -138,8 +138,6 @@ _LARGE = 1.5
 _BETTER = 0.2
 # Least score of head and shoulders at which another object can be the person.
 _HEAD_AND_SHOULDERS = 0.5
-# Penalty of the score per metre from the measured place.
-_PER_METRE = 0.1
 # Area of a hand with forearm, m². A region of this size can belong to the person while the rest
 # of the arm is not visible.
 _HAND_M2 = 0.04
@@ -283,10 +281,8 @@ class PersonRegion:
             cv2.filter2D(image, cv2.CV_32F, k, anchor=self._anchor, borderType=_BORDER)
             for k in self._kernels
         )
-        per_m, (hip_column, hip_row) = self._drawer.cells_per_m, self._start.hip
-        rows, columns = (np.arange(length, dtype=np.float32) for length in image.shape)
-        moved = np.hypot(rows[:, None] - hip_row, columns - hip_column)
-        fits = np.minimum(head, trunk) - np.float32(_PER_METRE / per_m) * moved
+        per_m, (hip_column, _) = self._drawer.cells_per_m, self._start.hip
+        fits = np.minimum(head, trunk)
         row, column = np.unravel_index(int(np.argmax(fits)), fits.shape)
         best = float(fits[row, column])
         if last is not None and best < float(np.where(last.near > 0, fits, -1.0).max()) + _BETTER:
