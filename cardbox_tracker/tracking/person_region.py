@@ -124,8 +124,6 @@ def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
 
 # Largest movement of a body part between frames: a hand at 3 m/s and 15 Hz.
 _NEAR_M = 0.2
-# The same without a last posture, when the arms can be anywhere beside the trunk.
-_NEAR_START_M = 0.3
 # Largest movement between frames of an object that touches the person.
 _STEP_M = 0.1
 # A region is near the last posture, or another object, if this share of it is.
@@ -151,7 +149,7 @@ class PersonRegion:
         """Set up for one body and one camera, which includes the pitch."""
         self._size = camera.height, camera.width
         self._drawer = PersonDrawer(body, camera)
-        self._start = self._drawer.masks(self._drawer.front, _NEAR_START_M)
+        self._start = self._drawer.masks(self._drawer.front, _NEAR_M)
         self._kernels, self._anchor = self._drawer.head_and_shoulders()
         per_m = self._drawer.cells_per_m
         self._cell_px = cell = self._drawer.cell_px
@@ -290,7 +288,7 @@ class PersonRegion:
         place = self._drawer.front.copy()
         place[0] += (float(column) - hip_column) / per_m
         place[-1] -= (float(row) - self._anchor[1]) / per_m
-        return self._drawer.masks(place, _NEAR_START_M), best
+        return self._drawer.masks(place, _NEAR_M), best
 
 
 def warm_up() -> None:
