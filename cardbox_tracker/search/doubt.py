@@ -76,7 +76,7 @@ _DOUBT_STAYS = 0.85
 STAYS_SURE = 1.25
 """Share of the limit of this doubt below which a sure posture stays so: a robot that follows would
 stop and go on where the doubt is about the limit."""
-_AREAS, _PRIORS = (0.1, 3.0), (-0.2, 0.3)
+_AREAS = 0.1, 3.0
 # Least probability of a keypoint, and of its opposite, that counts in the doubt about an image.
 _LEAST_CHANCE = 1e-3
 # How much better than its rivals a result is rated, as a share of the silhouette: least, usual and
@@ -291,7 +291,7 @@ def evidence_of_search(
         "outside": (model_px - common) / total,
         "area": area,
         "area difference": abs(area),
-        "prior": min(max(prior, _PRIORS[0]), _PRIORS[1]),
+        "prior": prior,
         "distance spread": float(deviations[TORSO_X]),
         "yaw": abs(float(state[YAW])),
         "pitch": abs(float(state[PITCH])),

@@ -43,7 +43,6 @@ from cardbox_tracker.terms.whole_body_config import WholeBodyCostConfig
     PENETRATION,
     UNKNOWN_DENSITY,
 ) = range(14)
-N_RULES = 14
 
 # The body ends this far below mid-hip, m, so that a hanging arm is not inside the legs.
 _HIPS_END_M = -0.1
@@ -158,7 +157,7 @@ def priors(state: Floats, body: BodyTuple, prior: PriorTuple) -> tuple[float, fl
 
 def rules_of(config: WholeBodyCostConfig) -> Floats:
     """Return the values of ``rules``, (14,), from the settings."""
-    rules = np.empty(N_RULES)
+    rules = np.empty(UNKNOWN_DENSITY + 1)
     rules[WEIGHT] = config.weight
     rules[ROLL_UNIT] = np.radians(config.roll_deg)
     rules[FORWARD_UNIT] = np.radians(config.pitch_forward_deg)

@@ -9,7 +9,7 @@ person's parts (``BodyModel.appearance``), and the term uses them in five steps:
 3. The gain of an arm is the mean ratio over its hand times the hand's area, plus the same for the
    forearm. The areas are those at the expected place of the person, so that neither short nor near
    limbs are preferred.
-4. A hand gains less where the other forearm covers it, and nothing behind the torso.
+4. A hand behind the torso gains nothing.
 5. Whether the forearms of a person without reference postures are bare is learned while tracking
    (:class:`Sleeves`).
 
@@ -54,8 +54,6 @@ _FIRST = 1.0
 _MOST = 3.0
 # Share of a hand's weight that is lost beside bare forearms.
 _LOST = 0.5
-# Change of the chance that is worth new ratios.
-_STEP = 0.01
 
 
 class Sleeves:
@@ -80,7 +78,7 @@ class Sleeves:
         self._histograms, self._forearm_m, self._px_per_m = histograms.copy(), forearm_m, px_per_m
         forearm_px = forearm_m[0] * forearm_m[1] * px_per_m**2
         self._weights = np.array([0.0, _WEIGHT / forearm_px])
-        self.log_odds, self._told = _FIRST, 0.0
+        self.log_odds = _FIRST
 
     @property
     def bare(self) -> float:
@@ -95,14 +93,13 @@ class Sleeves:
     @property
     def histograms(self) -> FloatArray:
         """Probability of each bin for each part, (5, bins), with forearms as they probably are."""
-        self._told = self.bare
         histograms = self._histograms.copy()
         skin, shirt = histograms[HAND], histograms[TORSO]
-        histograms[FOREARM] = self._told * skin + (1.0 - self._told) * shirt
+        histograms[FOREARM] = self.bare * skin + (1.0 - self.bare) * shirt
         return histograms
 
-    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> bool:
-        """Learn from one image; return whether ``histograms`` have changed.
+    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> None:
+        """Learn from one image.
 
         ``skin`` (h, w) has log-likelihood ratios of the hand against the part behind, nats, and
         begins at the column and row ``corner``; 0 where both are alike. The person has one state.
@@ -112,9 +109,8 @@ class Sleeves:
         gains = ArmGains(maps, corner, self._weights, self._px_per_m, self._forearm_m)
         for arm in (0, 1):
             points, hidden = arms_in_image(posed, arm)
-            self.log_odds += float(gains(points, hidden, points)[0])
+            self.log_odds += float(gains(points, hidden)[0])
         self.log_odds = float(np.clip(self.log_odds, -_MOST, _MOST))
-        return abs(self.bare - self._told) > _STEP
 
 
 def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -146,15 +142,10 @@ class ArmGains:
     px_per_m: float  #: scale at the expected place of the person
     forearm_m: tuple[float, float]  #: length, including the fist, and width of the forearm
 
-    def __call__(
-        self, points: FloatArray, hidden: NDArray[np.bool_], others: FloatArray
-    ) -> FloatArray:
-        """Return the gains (N,), px, of arms; ``points`` and ``hidden`` as :func:`arms_in_image`.
-
-        ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all.
-        """
+    def __call__(self, points: FloatArray, hidden: NDArray[np.bool_]) -> FloatArray:
+        """Return the gains (N,), px, of arms with the results of :func:`arms_in_image`."""
         gains = np.empty(len(points))
-        kernels.arm_gains(points, hidden, others, *self.arguments, gains)
+        kernels.arm_gains(points, hidden, *self.arguments, gains)
         return gains
 
     @cached_property
@@ -234,11 +225,11 @@ class InnerCueTerm:
         self._follow_light(image, frame.silhouette, zones)
         u0, v0, width, height = cv2.boundingRect(frame.silhouette)
         maps = self._maps(image, frame.silhouette, zones, (u0, v0, width, height))
-        if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), before):
+        if self._sleeves is not None:
+            self._sleeves.see(maps[0], (u0, v0), before)
             self._use(self._sleeves)
         return InnerCueObservation(
-            ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m),
-            np.array([arms_in_image(before, arm)[0] for arm in (0, 1)]),
+            ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m)
         )
 
     def _comparable(self, image: Image) -> Image | None:
@@ -315,11 +306,9 @@ class InnerCueObservation(TermObservation):
     """The cue of one frame."""
 
     gains: ArmGains  #: gains of arms in this frame
-    before: FloatArray  #: elbow and hand of each arm in the previous frame, (2, 1, 2, 3)
 
     def rate(self, posed: Posed) -> FloatArray:
         """Rate the arms that count; the outline determines the trunk."""
         costs = np.zeros(len(posed.states))
-        of = posed.states, posed.parts, posed.body, self.before
-        costs_of_arms(*of, *self.gains.arguments, costs)
+        costs_of_arms(posed.states, posed.parts, posed.body, *self.gains.arguments, costs)
         return costs

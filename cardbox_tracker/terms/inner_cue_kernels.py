@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from cardbox_tracker.camera.camera import NEAREST_M
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import kernel
 from cardbox_tracker.person.kinematics import (
     angles_in,
     new_arm,
@@ -27,10 +27,6 @@ _POINTS = (6, 3)
 # The hand's patch is nearly square; its middle lies before the forearm's end.
 _HAND_LENGTH_M, _HAND_WIDTH_M, _HAND_BEFORE_END_M = 0.09, 0.075, 0.02
 _HAND_POINTS = (4, 3)
-# Share of a hand's gain that is lost if the other forearm covers it: a pixel shows one hand.
-_CLAIM = 0.5
-# Distance from the axis of the other forearm, or its hand, up to which it covers pixels.
-_CLAIM_REACH_M = 0.09
 # A hand this far behind the torso's middle, and within its width, is hidden.
 _BEHIND_M = 0.03
 
@@ -147,23 +143,10 @@ def _mean(ratios: Any, centre: Pair, half: Pair, aside: Pair, points: tuple[int,
     return total / (along * across)
 
 
-@inlined_kernel
-def _claimed(u: float, v: float, other: Any, u0: int, v0: int) -> float:
-    """Return the share, 0 to 1, of a hand at (u, v) that the other forearm or hand covers."""
-    eu, ev = other[0, 0] - u0, other[0, 1] - v0
-    du, dv = other[1, 0] - u0 - eu, other[1, 1] - v0 - ev
-    along = ((u - eu) * du + (v - ev) * dv) / max(du * du + dv * dv, 1e-6)
-    along = min(max(along, 0.0), 1.05)
-    away = sqrt((u - eu - along * du) ** 2 + (v - ev - along * dv) ** 2)
-    covered: float = max(1.0 - away / (_CLAIM_REACH_M * other[1, 2]), 0.0)
-    return covered
-
-
 @kernel
 def arm_gains(
     points: Any,
     hidden: Any,
-    others: Any,
     maps: Maps,
     forearm: Forearm,
     weights: Any,
@@ -171,8 +154,7 @@ def arm_gains(
 ) -> None:
     """Write the gains (N,), px, of arms with the ``points`` and ``hidden`` of :func:`project_arms`.
 
-    ``others`` are points of the other arm, (N, 2, 3), or (1, 2, 3) for all; ``weights`` (2,) are
-    those of a nat of hand and forearm, px of the outline.
+    ``weights`` (2,) are those of a nat of hand and forearm, px of the outline.
     """
     ratios, u0, v0 = maps
     forearm_m, width_m, px_per_m = forearm
@@ -191,9 +173,6 @@ def arm_gains(
         centre = (hu - before * du, hv - before * dv)
         half, aside = (au * along, av * along), (-av * across, au * across)
         hand = _mean(ratios[0], centre, half, aside, _HAND_POINTS)
-        if hand > 0.0:
-            other = others[i if others.shape[0] > 1 else 0]
-            hand *= 1.0 - _CLAIM * _claimed(hu, hv, other, u0, v0)
         gains[i] += weights[0] * hand * _HAND_LENGTH_M * _HAND_WIDTH_M * px_per_m**2
         middle, reach = 0.5 * (_BEGIN + _END), 0.5 * (_END - _BEGIN)
         across = 0.5 * _WIDTH * width_m * per_m
@@ -210,7 +189,6 @@ def costs_of_arms(
     states: Any,
     counted: Drawn,
     body: BodyTuple,
-    before: Any,
     maps: Maps,
     forearm: Forearm,
     weights: Any,
@@ -218,19 +196,15 @@ def costs_of_arms(
 ) -> None:
     """Subtract the gains of the arms of states (N, 14) from ``costs`` (N,), px.
 
-    ``counted`` says whether trunk, left arm and right arm count. While one arm is rated, the other
-    one has its place in the previous frame: ``before`` (2, 1, 2, 3) has both. ``weights`` are those
-    of :func:`arm_gains`.
+    ``counted`` says whether trunk, left arm and right arm count; ``weights`` are those of
+    :func:`arm_gains`.
     """
     count = states.shape[0]
-    points, hidden = np.empty((2, count, 2, 3)), np.empty((2, count), np.bool_)
+    points, hidden = np.empty((count, 2, 3)), np.empty(count, np.bool_)
     gains = np.empty(count)
     for arm in range(2):
         if counted[1 + arm]:
-            project_arms(states, arm, body, points[arm], hidden[arm])
-    for arm in range(2):
-        if counted[1 + arm]:
-            others = points[1 - arm] if counted[2 - arm] else before[1 - arm]
-            arm_gains(points[arm], hidden[arm], others, maps, forearm, weights, gains)
+            project_arms(states, arm, body, points, hidden)
+            arm_gains(points, hidden, maps, forearm, weights, gains)
             for i in range(count):
                 costs[i] -= gains[i]

@@ -45,10 +45,10 @@ from cardbox_tracker.terms.joint_points_kernels import (
 )
 from cardbox_tracker.terms.term import ARMS, Frame, Posed, Term, TermObservation
 
-# Deviation of a point, m and px; speed of the joint, m/s, which makes older points uncertain.
+# Deviation of a point, m and px; speed of a joint, m/s, which makes older points uncertain.
 _JOINT_M = {SHOULDER: 0.025, ELBOW: 0.02, WRIST: 0.02, KNUCKLES: 0.04}
-_JOINT_M_PER_S = {SHOULDER: 0.2, ELBOW: 0.5, WRIST: 0.8, KNUCKLES: 0.9}
-_TRUNK_M, _TRUNK_M_PER_S = 0.05, 0.25
+_TRUNK_M = 0.05
+_M_PER_S = 0.5
 POINT_PX = 1.5
 # Bones (upper arm, forearm, shoulders, trunk): deviation of the component along the line of sight,
 # and mean difference of the detector's from the true one (docs/research.md). That of the shoulders
@@ -170,9 +170,8 @@ class JointPointsTerm:
         deviations = np.empty((N_POINTS, 2))
         for arm in range(2):
             for joint, metres in _JOINT_M.items():
-                moved_m = age_s * _JOINT_M_PER_S[joint]
-                deviations[POINTS_OF_ARM * arm + joint] = hypot(metres, moved_m), POINT_PX
-        deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _TRUNK_M_PER_S), POINT_PX
+                deviations[POINTS_OF_ARM * arm + joint] = hypot(metres, age_s * _M_PER_S), POINT_PX
+        deviations[[HIPS, EARS]] = hypot(_TRUNK_M, age_s * _M_PER_S), POINT_PX
         bones = np.zeros((N_BONES, 3))
         bones[:, 2] = _BONE_DEVIATIONS * (1.0 + age_s / 0.1)
         away = np.tile([0.0, 0.0, 1.0], (N_BONES, 1))

@@ -44,7 +44,7 @@ from cardbox_tracker.terms.term import Posed, Silhouette, TermObservation
 
 INFORMATION = 0.01
 """Weight of a pixel of outline, 1 / px^2; it is low because errors of neighbours are correlated."""
-_PER_HALF = 1.0 / HALF_PX**2
+_PER_HALF = HALF_PX**-2
 # Half of the stretch over which the distance's gradient is taken; shorter ones suffer from pixels.
 # So near to the border of window or image, or to another person, no point of the outline counts.
 _APART_PX = 3

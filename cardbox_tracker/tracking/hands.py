@@ -79,8 +79,8 @@ _TURNS, _FLEXIONS, _DEVIATIONS = (
 _FLEXED_RAD, _DEVIATED_RAD, _FACING_RAD = np.radians([20.0, 10.0, 35.0])
 # A palm's normal shows the turn if its part across the forearm is larger; a smaller one shows less.
 _SHOWS = 0.5
-# Deviation of the forearm, and of a turn of which nothing is known, rad.
-_FOREARM_RAD, _UNKNOWN_RAD = np.radians(10.0), np.pi / np.sqrt(3.0)
+# Deviation of the forearm, rad.
+_FOREARM_RAD = np.radians(10.0)
 # Logarithm of the odds of fingers that bend to the palm, for a length of the palm.
 _CURL = 4.65
 # Sine of the least bend of an elbow whose plane is known.
@@ -208,7 +208,7 @@ def measured(
         rotation = float(_wrapped(turn))
         if estimate.posture_stddev is not None:
             elbow = np.asarray(estimate.posture_stddev)[_ELBOWS[side]]
-            stddev[2] = min(hypot(turn_stddev, *(elbow / bend)), _UNKNOWN_RAD)
+            stddev[2] = hypot(turn_stddev, *(elbow / bend))
     palm = axes @ directions(turn, flexion, deviation)[0]
     wrist = np.array([flexion, deviation, rotation])
     return Hand(opened(found), palm, wrist, stddev, turn_stddev=turn_stddev)

@@ -70,19 +70,16 @@ LARGEST_STDDEV_RAD = np.radians(20.0)
 _N = len(NECK_LIMITS)
 # Angles of the torso about the axes of the neck.
 _OF_TORSO = [YAW, PITCH, ROLL][:_N]
-_BEYOND_LIMITS_RAD = np.radians(15.0)
 _FARTHEST_M = 0.3
 
 # Standard deviations: face model and detector in metres at the face, detector in pixels.
 _POINT_M, _POINT_PX = 0.010, 1.0
 # Of the priors of yaw, pitch, roll, rad; place across and up, m; logarithm of the size.
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
-_STARTS = np.zeros((5, 6))
-_STARTS[1:, :2] = np.radians([(45.0, 0.0), (-45.0, 0.0), (0.0, 35.0), (0.0, -35.0)])
 _RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
-SMOOTHING_S, MOST_KEPT = 0.15, 0.5
-"""Time constant of the smoothing, s, and largest weight of the last output."""
+SMOOTHING = 0.5
+"""Weight of the last output in the next one."""
 _DRIFT_RAD_S = 1.0
 
 
@@ -129,12 +126,12 @@ def fit_neck(
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
     rms = float(np.sqrt(found.total[best] / (2 * np.count_nonzero(known))))
     angles = values[:_N]
-    beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
+    beyond = (angles < NECK_LIMITS[:, 0]) | (angles > NECK_LIMITS[:, 1])
     stddev = np.sqrt(np.diag(np.linalg.inv(information))[:_N]) * max(1.0, rms)
     is_face = rms <= LARGEST_RMS and np.hypot(*values[3:5]) <= _FARTHEST_M
-    if not is_face or (beyond > _BEYOND_LIMITS_RAD).any() or (stddev > LARGEST_STDDEV_RAD).any():
+    if not is_face or beyond.any() or (stddev > LARGEST_STDDEV_RAD).any():
         return None
-    return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
+    return Neck(angles, stddev)
 
 
 @inlined_kernel
@@ -175,23 +172,14 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 def _solve(given: _Given) -> Equations:
     """Return the equations of the best values from each start."""
     rows = given, 2 * given[3].shape[0], DIFFERENCE
-    return minimize_compiled(_write_residuals, rows, _STARTS, _RULES, ENDS)
-
-
-def low_passed(before: FloatArray, values: FloatArray, interval_s: float) -> FloatArray:
-    """Return values (n,) after first-order smoothing, ``interval_s`` after the output ``before``.
-
-    y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2. A ramp is delayed
-    by dt a / (1 - a): less than the time constant, and never more than one interval.
-    """
-    kept = min(exp(-interval_s / SMOOTHING_S), MOST_KEPT)
-    return kept * before + (1.0 - kept) * values
+    return minimize_compiled(_write_residuals, rows, np.zeros((1, 6)), _RULES, ENDS)
 
 
 class HeadTracker:
     """Adds the direction of the head to the estimates of one person, smoothed over time.
 
-    A face that is hidden for less than half a second keeps its direction, with a growing deviation.
+    The smoothing delays a motion by one interval. A face that is hidden for less than half a second
+    keeps its direction, with a growing deviation.
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
@@ -208,7 +196,7 @@ class HeadTracker:
         neck = self._fit(frame.points, found)
         if neck is not None:
             if self._last is not None:
-                angles = low_passed(self._last.angles, neck.angles, self._age_s)
+                angles = SMOOTHING * self._last.angles + (1.0 - SMOOTHING) * neck.angles
                 neck = neck._replace(angles=angles)
             self._last, self._age_s = neck, 0.0
         if self._last is None or found.posture is None:

@@ -23,7 +23,7 @@ from cardbox_tracker.common.least_squares import (
 from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
-LENGTHS = N_ANGLES = 8
+LENGTHS = N_ANGLES = len(LEG_LIMITS)
 FLOOR = LENGTHS + 2
 DISTANCE, N_VALUES = FLOOR + 1, FLOOR + 2
 REST = np.tile(np.radians([60.0, 15.0, 15.0, 60.0]), 2)

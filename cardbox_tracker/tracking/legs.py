@@ -47,7 +47,7 @@ from cardbox_tracker.person.parts import body_parts
 from cardbox_tracker.person.posture import TORSO_Y, YAW
 from cardbox_tracker.person.proportions import HIP_SHARE, MARKED_HEIGHTS, THIGH_SHARE, stature_of
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import LEG_LIMITS, KeypointState, rotation_z
+from cardbox_tracker.person.skeleton import LEG_LIMITS, LEG_NAMES, KeypointState, rotation_z
 from cardbox_tracker.terms.joint_points import POINT_PX
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking import leg_fit
@@ -65,7 +65,7 @@ _ENDS = [
     for side in ("left", "right")
 ]
 # The bends of both knees among the angles.
-_KNEES = [3, 7]
+_KNEES = [LEG_NAMES.index(f"{side}_knee_flexion") for side in ("left", "right")]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
@@ -73,12 +73,10 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 # the hip below the joint, where the thigh begins.
 _ANKLE_SHARE = float(MARKED_HEIGHTS[5])
 _BONES = np.array([THIGH_SHARE, MARKED_HEIGHTS[4] - _ANKLE_SHARE])
-# Width of the image's border, as a share of its longer side, where the detector guesses points.
-_BORDER = 0.005
-# Deviation of the points of knee and ankle, m; how much larger that of an unseen one is.
-_POINT_M, _UNSEEN = 0.025, 6.0
-# Deviations of the slopes of thigh and shank, and how much larger those of unseen ones are.
-_SLOPES, _UNSEEN_SLOPE = np.array([0.22, 0.12]), 1.5
+# Deviation of the points of knee and ankle, m.
+_POINT_M = 0.025
+# Deviations of the slopes of thigh and shank.
+_SLOPES = np.array([0.22, 0.12])
 # The true slopes as linear functions of the detector's: factors and offsets.
 _SLOPE_FACTORS, _SLOPE_OFFSETS = np.array([0.93, 0.68]), np.array([-0.04, -0.08])
 # Change of an angle and its growth a second, rad.
@@ -91,8 +89,6 @@ _FIXED = 1e-6
 # Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
 # arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
 _BALANCE_M, _UPPER_SHARE = 0.03, 0.626
-# Largest share of its length by which a trunk leans ahead.
-_MOST_LEAN = 0.7
 # Somebody stands who bends the knees by less, rad. Who bends them more, and has not moved the hips
 # by this distance, m, for this time, s, sits. A foot that is higher than the other one by this
 # distance is not on the floor.
@@ -275,21 +271,19 @@ class _Fit:
         px, scores = points.legs.px[_ENDS], points.legs.scores[_ENDS]
         known = np.asarray(np.isfinite(px).all(axis=-1))
         # The detector guesses what is outside of the image, such as a foot that is cut off.
-        inside = is_inside(points.legs.px, self._camera, _BORDER) | (points.legs.scores <= 0.0)
+        inside = is_inside(points.legs.px, self._camera, 0.0) | (points.legs.scores <= 0.0)
         scores[:, 0] *= inside[:2]
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
         is_seen = scores >= CERTAIN
-        sigma_px = np.hypot(POINT_PX, self.px_per_m * _POINT_M)
-        sigma_px = np.where(is_seen, sigma_px, _UNSEEN * sigma_px)
-        sigma_px = np.where(known, sigma_px, np.inf)
+        sigma_px = np.where(is_seen, np.hypot(POINT_PX, self.px_per_m * _POINT_M), np.inf)
         slopes = _UNKNOWN
         if points.spatial_m is not None and points.legs.spatial_m is not None:
             ends_m = points.legs.spatial_m[_ENDS]
             bones = np.diff(ends_m, axis=1, prepend=points.spatial_m[_HIPS][:, None])
             slopes = bones[..., 2] / np.maximum(np.linalg.norm(bones, axis=-1), 1e-6)
             slopes = _SLOPE_FACTORS * slopes + _SLOPE_OFFSETS
-        sigma_slopes = np.where(is_seen, _SLOPES, _UNSEEN_SLOPE * _SLOPES)
+        sigma_slopes = np.where(is_seen, _SLOPES, np.inf)
         hips = points.scores[_HIPS][:, None]
         scores = np.concatenate([hips, scores], axis=1)
         return _Seen(px, sigma_px, slopes, sigma_slopes, scores, points.px[_HIPS], shows_back)
@@ -321,7 +315,7 @@ class _Fit:
         """Return how far a trunk leans whose mass is balanced over legs (6, 3), rad."""
         upper_m = _UPPER_SHARE * np.linalg.norm(self._trunk_m)
         share = leg_fit.balanced_m(points_m, self._turn[:, 0]) / upper_m
-        return float(np.arcsin(np.clip(share, 0.0, _MOST_LEAN)))
+        return float(np.arcsin(np.clip(share, 0.0, 1.0)))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:
         """Return values (16, 12) of legs whose knees and ankles are where they are seen.

@@ -62,8 +62,8 @@ _CLOTHES_M = 0.02
 _BAND_M = 0.1
 # Distance from the fist to the fingertips, plus the error of keypoints.
 _BEYOND_HAND_M = 0.25
-# Gap and width of the background ring around head and shoulders.
-_GAP_M, _RING_M = 0.05, 0.2
+# Width of the background ring around head and shoulders.
+_RING_M = 0.2
 
 
 @dataclass(frozen=True)
@@ -143,16 +143,15 @@ class PersonDrawer:
         minus the foreground share of the ring around head and shoulders.
         """
         points = self._points(self.front)
-        head, trunk, gap, ring = (np.zeros(self.shape, np.uint8) for _ in range(4))
+        head, trunk, ring = (np.zeros(self.shape, np.uint8) for _ in range(3))
         self._draw_head(head, points, 0.0)
         self._draw_torso(trunk, points, 0.0)
-        for mask, grow_m in ((gap, _GAP_M), (ring, _RING_M)):
-            self._draw_head(mask, points, grow_m)
-            self._draw_torso(mask, points, grow_m)
+        self._draw_head(ring, points, _RING_M)
+        self._draw_torso(ring, points, _RING_M)
         hip, shoulder = points[HIP], points[LEFT]
         rows = np.arange(self.shape[0])
+        around = (ring > 0) & (head == 0) & (trunk == 0) & (rows < shoulder[1])[:, None]
         trunk[rows > hip[1]] = 0
-        around = (ring > 0) & (gap == 0) & (rows < shoulder[1])[:, None]
         kernels = []
         for inside in (head > 0, trunk > 0):
             kernel = np.zeros(self.shape, np.float32)

@@ -124,8 +124,6 @@ def _learn(image: Any, shows: Any, looks: Any, counts: Any) -> None:
 
 # Largest movement of a body part between frames: a hand at 3 m/s and 15 Hz.
 _NEAR_M = 0.2
-# The same without a last posture, when the arms can be anywhere beside the trunk.
-_NEAR_START_M = 0.3
 # Largest movement between frames of an object that touches the person.
 _STEP_M = 0.1
 # A region is near the last posture, or another object, if this share of it is.
@@ -138,8 +136,6 @@ _LARGE = 1.5
 _BETTER = 0.2
 # Least score of head and shoulders at which another object can be the person.
 _HEAD_AND_SHOULDERS = 0.5
-# Penalty of the score per metre from the measured place.
-_PER_METRE = 0.1
 # Area of a hand with forearm, m². A region of this size can belong to the person while the rest
 # of the arm is not visible.
 _HAND_M2 = 0.04
@@ -153,7 +149,7 @@ class PersonRegion:
         """Set up for one body and one camera, which includes the pitch."""
         self._size = camera.height, camera.width
         self._drawer = PersonDrawer(body, camera)
-        self._start = self._drawer.masks(self._drawer.front, _NEAR_START_M)
+        self._start = self._drawer.masks(self._drawer.front, _NEAR_M)
         self._kernels, self._anchor = self._drawer.head_and_shoulders()
         per_m = self._drawer.cells_per_m
         self._cell_px = cell = self._drawer.cell_px
@@ -283,10 +279,8 @@ class PersonRegion:
             cv2.filter2D(image, cv2.CV_32F, k, anchor=self._anchor, borderType=_BORDER)
             for k in self._kernels
         )
-        per_m, (hip_column, hip_row) = self._drawer.cells_per_m, self._start.hip
-        rows, columns = (np.arange(length, dtype=np.float32) for length in image.shape)
-        moved = np.hypot(rows[:, None] - hip_row, columns - hip_column)
-        fits = np.minimum(head, trunk) - np.float32(_PER_METRE / per_m) * moved
+        per_m, (hip_column, _) = self._drawer.cells_per_m, self._start.hip
+        fits = np.minimum(head, trunk)
         row, column = np.unravel_index(int(np.argmax(fits)), fits.shape)
         best = float(fits[row, column])
         if last is not None and best < float(np.where(last.near > 0, fits, -1.0).max()) + _BETTER:
@@ -294,7 +288,7 @@ class PersonRegion:
         place = self._drawer.front.copy()
         place[0] += (float(column) - hip_column) / per_m
         place[-1] -= (float(row) - self._anchor[1]) / per_m
-        return self._drawer.masks(place, _NEAR_START_M), best
+        return self._drawer.masks(place, _NEAR_M), best
 
 
 def warm_up() -> None:

@@ -16,7 +16,6 @@ from cardbox_tracker.camera.view import OtherCamera, View
 from cardbox_tracker.common.settings import all_of_kind, of_kind, restarts, settings_or
 from cardbox_tracker.person.kinematics import clavicles
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import LEFT_ARM, RIGHT_ARM, TURNING_LIMITS, TURNS
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.search.config import TrackerConfig
 from cardbox_tracker.search.doubt import BACK, doubted
@@ -53,8 +52,6 @@ FILTERS: MappingProxyType[str, MakeFilter] = MappingProxyType(
 
 # A model that overlaps the silhouette less than this is somewhere else.
 _TOUCHING_IOU = 0.05
-# A joint is at its limit within this angle, rad.
-_AT_LIMIT_RAD = np.radians(0.5)
 
 
 class Tracker:
@@ -295,8 +292,6 @@ class Tracker:
             reason = "the body is too large for the distance"
         if self._is_alone and self.cameras[0].identity.is_doubtful:
             reason = "it may be somebody else"
-        if self.config.has_several_views and is_at_two_limits(estimate.posture):
-            reason = "joints are at their limits"
         state, states = estimate.state, estimate.keypoint_states
         if reason and states is not None:
             states = doubted(states)
@@ -399,12 +394,3 @@ class Tracker:
             self._facing.see(frame, Posed(self.cameras[0].posable, self._before[None]))
             return BACK if self._facing.shows_back else ""
         return CONTRADICTED if self.faults.is_contradicted else ""
-
-
-def is_at_two_limits(posture: FloatArray) -> bool:
-    """Return whether two joints of the trunk, or of one arm, are at their limits.
-
-    People hardly do that, but a search that finds no way on does.
-    """
-    is_at = (np.abs(posture[:, None] - TURNING_LIMITS) < _AT_LIMIT_RAD).any(axis=1)
-    return any(np.count_nonzero(is_at[part]) >= 2 for part in (TURNS, LEFT_ARM, RIGHT_ARM))

@@ -16,11 +16,11 @@ from cardbox_tracker.detectors.identity import OTHER, Identity, apart, unlike
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import PITCH, ROLL, TORSO_Y, reference_posture
+from cardbox_tracker.person.posture import TORSO_Y, reference_posture
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import LOST, TRACKING
 from cardbox_tracker.tracking.observation import Observation
-from cardbox_tracker.tracking.tracker import Tracker, is_at_two_limits
+from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(320, 240, 260.0, 260.0, 159.5, 119.5)
 BODY = BodyModel.of(distance_m=2.6, hip_height_m=-0.25)
@@ -72,16 +72,6 @@ def test_colours_as_far_apart_as_0_6_tell_the_same_person(distance: float, is_al
         identity.is_same(figure(0.0), CLOTHES, number * STEP_NS)
     assert identity.is_same(figure(0.0), colours, 5_000_000_000) == is_alike
     assert (unlike(None, CLOTHES, None, colours, 0) < OTHER) == is_alike
-
-
-def test_two_joints_of_one_part_at_their_limits() -> None:
-    posture = np.zeros(12)
-    posture[[ROLL, 4]] = np.radians([45.0, 180.0])
-    assert not is_at_two_limits(posture)
-    posture[PITCH] = np.radians(-24.8)
-    assert is_at_two_limits(posture)
-    posture[[PITCH, 5]] = np.radians([20.0, -60.0])
-    assert is_at_two_limits(posture)
 
 
 @pytest.mark.parametrize("has_image", [True, False])
