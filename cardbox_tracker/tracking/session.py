@@ -80,8 +80,8 @@ _HELD_NS = 3_000_000_000
 _SAME_STATURE = 0.08
 # Images in a row in which somebody new is seen before they are tracked, after the first images.
 _PROVED = 3
-# Least height of the region of a new person, as a share of the image.
-_LEAST_HEIGHT = 0.25
+# Least area and height of the region of a new person, as shares of the image.
+_LEAST_AREA, _LEAST_HEIGHT = 0.01, 0.25
 # Deviation of the gap between lines of sight to the middle of a trunk, m; length of a trunk, m, and
 # relative deviation of that which the place where they meet gives.
 _GAP_M, _TRUNK_M, _TRUNK = 0.15, 0.5, 0.4
@@ -469,7 +469,8 @@ class Session:
         count, labels, stats, _ = cv2.connectedComponentsWithStats(silhouette)
         shown = []
         for label in range(1, count):
-            is_small = stats[label, cv2.CC_STAT_HEIGHT] < _LEAST_HEIGHT * len(labels)
+            height, area = stats[label, cv2.CC_STAT_HEIGHT], stats[label, cv2.CC_STAT_AREA]
+            is_small = area < _LEAST_AREA * silhouette.size or height < _LEAST_HEIGHT * len(labels)
             region = labels == label
             if not is_small and not (taken[region] > 0).any():
                 shown.append(Shown(None, None, np.where(region, np.uint8(255), np.uint8(0))))
