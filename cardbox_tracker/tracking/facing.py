@@ -22,21 +22,24 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.terms.inner_cue import chest_levels, zones_of
 from cardbox_tracker.terms.term import Frame, Image, Posed, Silhouette
 
-# Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse.
-_ACROSS, _DOWN = np.linspace(-0.6, 0.6, 8), np.linspace(-0.3, 0.2, 6)
+# Grid from the forehead to the cheeks, as shares of the half axes of the head's ellipse; fewest of
+# its pixels that count.
+_ACROSS, _DOWN, _LEAST_PX = np.linspace(-0.6, 0.6, 8), np.linspace(-0.3, 0.2, 6), 12
 # Log-likelihood ratio of skin and head below which a colour is hair.
 _HAIR_NATS = -0.7
 # Least usual share of hair, so that a back has a third in all.
 _LEAST_USUAL = 0.07
-# Time constant of the present share, s.
-_NOW_S = 0.5
-# Time with the face after which the usual share is known, and the longest that a sample stands
-# for, s.
-_KNOWN_S = 1.0
+# Time between samples, and time constants of the present share and of the usual one, s.
+_EVERY_S, _NOW_S, _USUAL_S = 0.2, 0.5, 4.0
+# Time with the face after which the usual share is known, and the longest that a sample
+# stands for, s; largest change of the usual share by a sample.
+_KNOWN_S, _USUAL_CHANGE = 1.0, 0.1
 # Yaw of a person who faces the camera, and lean that shows the top of the head, rad.
 _FACING_RAD, _LEAN_RAD = np.radians(30.0), np.radians(6.0)
 # Height above its middle that an upright head reaches, as a share of the ellipse's half axis.
 _TOP = 0.65
+# Weight of a sample in the low-pass filter of the torso's brightness.
+_LIGHT = 0.5
 
 
 class Facing:
@@ -75,6 +78,8 @@ class Facing:
         if state[PITCH] > _LEAN_RAD or _is_low(zones, frame.silhouette):
             self.shows_back, self._now = False, None
             return
+        if self._elapsed_s < _EVERY_S:
+            return
         hair = self._hair(frame.image, frame.silhouette, zones)
         if hair is not None:
             self._add(hair, abs(float(state[YAW])) < _FACING_RAD)
@@ -89,9 +94,10 @@ class Facing:
         if is_known:
             excess = now - max(self._usual, _LEAST_USUAL)
             self.shows_back = WATCHES["back"].is_beyond(excess, self.shows_back)
-        if is_frontal and not self.shows_back:
+        is_usual = not is_known or abs(now - self._usual) < _USUAL_CHANGE
+        if is_frontal and is_usual and not self.shows_back:
             self._known_s += passed_s
-            self._usual += passed_s / self._known_s * (hair - self._usual)
+            self._usual += passed_s / min(self._known_s, _USUAL_S) * (hair - self._usual)
 
     def _hair(self, image: Image, silhouette: Silhouette, zones: FloatArray) -> float | None:
         """Return the share of hair in the face's place; None if it is hardly in the silhouette."""
@@ -99,7 +105,7 @@ class Facing:
         assert appearance is not None
         chest = chest_levels(image, silhouette, zones)
         if chest is not None:
-            self._brightness = chest
+            self._brightness = self._brightness + _LIGHT * (chest - self._brightness)
         u, v, half_width, half_height = zones[:4].tolist()
         columns = np.rint(u + half_width * _ACROSS).astype(np.intp)
         rows = np.rint(v + half_height * _DOWN).astype(np.intp)
@@ -108,7 +114,7 @@ class Facing:
         rows = rows[(rows >= 0) & (rows < height)]
         place = np.ix_(rows, columns)
         pixels = image[place][silhouette[place] > 0]
-        if not len(pixels):
+        if len(pixels) < _LEAST_PX:
             return None
         bins = np.zeros(len(pixels), np.intp)
         steps = steps_of_levels(self._brightness, appearance.brightness)
