@@ -73,6 +73,8 @@ _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 # the hip below the joint, where the thigh begins.
 _ANKLE_SHARE = float(MARKED_HEIGHTS[5])
 _BONES = np.array([THIGH_SHARE, MARKED_HEIGHTS[4] - _ANKLE_SHARE])
+# Width of the image's border, as a share of its longer side, where the detector guesses points.
+_BORDER = 0.005
 # Deviation of the points of knee and ankle, m.
 _POINT_M = 0.025
 # Deviations of the slopes of thigh and shank.
@@ -271,7 +273,7 @@ class _Fit:
         px, scores = points.legs.px[_ENDS], points.legs.scores[_ENDS]
         known = np.asarray(np.isfinite(px).all(axis=-1))
         # The detector guesses what is outside of the image, such as a foot that is cut off.
-        inside = is_inside(points.legs.px, self._camera, 0.0) | (points.legs.scores <= 0.0)
+        inside = is_inside(points.legs.px, self._camera, _BORDER) | (points.legs.scores <= 0.0)
         scores[:, 0] *= inside[:2]
         scores[:, 1] *= inside[2:].reshape(3, 2).all(axis=0)
         px, scores = np.where(known[..., None], px, 0.0), np.where(known, scores, 0.0)
