@@ -24,6 +24,9 @@ MARGIN = 0.03
 margins touch are one body."""
 # Moving regions below this share of the image are noise.
 _LEAST = 0.0005
+# Hidden rests below this share of the image are filled from their surroundings.
+_REST = 0.002
+_REST_RADIUS_PX = 3.0
 
 
 class PartialScene:
@@ -41,8 +44,8 @@ class PartialScene:
 
     @property
     def is_whole(self) -> bool:
-        """Whether nothing is hidden any more."""
-        return self._known is not None and bool(self._known.all())
+        """Whether only small specks are still hidden."""
+        return self._known is not None and self.hidden <= _REST
 
     def add(self, model: BackgroundModel, moved: Mask) -> None:
         """Add mean and deviation (H, W) of a span of time, but not where something ``moved``."""
@@ -62,10 +65,20 @@ class PartialScene:
         self._known = self._known | new
 
     def model(self) -> BackgroundModel:
-        """Return the whole scene; ValueError if a part of it is hidden."""
-        if self._model is None or not self.is_whole:
+        """Return the whole scene; ValueError if a part larger than a speck is hidden."""
+        if self._model is None or self._known is None or not self.is_whole:
             raise ValueError(f"{100 * self.hidden:.1f} % of the scene was not seen yet")
-        return self._model
+        if self._known.all():
+            return self._model
+        unknown = ~self._known
+        mean = _filled(self._model.mean, unknown)
+        stddev = _filled(self._model.stddev, unknown)
+        chroma = self._model.chroma
+        if chroma is not None:
+            small = _resized(unknown, chroma.mean.shape[:0:-1])
+            planes = [np.stack([_filled(p, small) for p in part]) for part in chroma]
+            chroma = ChromaModel(*planes)
+        return BackgroundModel(mean, stddev, chroma)
 
 
 def bodies(moved: Mask) -> Mask:
@@ -122,3 +135,8 @@ def merged(
         np.where(small, other.chroma.stddev, known.chroma.stddev),
     )
     return BackgroundModel(mean, stddev, chroma)
+
+
+def _filled(plane: FloatImage, unknown: Mask) -> FloatImage:
+    filled = cv2.inpaint(plane, unknown.astype(np.uint8), _REST_RADIUS_PX, cv2.INPAINT_NS)
+    return np.asarray(filled, np.float32)
