@@ -109,7 +109,7 @@ def scenes() -> tuple[tuple[np.ndarray, np.ndarray, ImagePoints | None], ...]:
 
 def result_of(config: TrackerConfig) -> list[Any]:
     """What is estimated of the scenes, as bytes."""
-    tracker = Tracker(body(), CAMERA, config, np.random.default_rng(1))
+    tracker = Tracker(body(), CAMERA, config, np.random.default_rng(0))
     found: list[Any] = []
     for image, silhouette, points in scenes():
         one = tracker.track(Observation(silhouette, image, points=points))
