@@ -51,10 +51,12 @@ BREADTH_OF_SPAN = 0.207
 """Distance of the shoulder joints in spans: 0.209 in MakeHuman, 0.218 in Rocketbox, and 0.193 for a
 biacromial breadth less 3 cm on either side (ANSUR II)."""
 
+# Row of the shoulders' width below the arms' axes in spans.
+_SHOULDERS_BELOW = 0.02
 # Correction of the span for fingertips that bend down and are nearer to the camera than the body.
 _SPAN_IN_PLANE = 0.99
-# Factor from width to breadth; relative deviations by span, axes and width.
-_BREADTH_OF_WIDTH = 0.737
+# Factors from axes distance and width to breadth; relative deviations by span, axes and width.
+_BREADTH_OF_AXES, _BREADTH_OF_WIDTH = 1.010, 0.737
 _BREADTH_SD = np.array([0.05, 0.031, 0.046])
 
 
@@ -109,8 +111,8 @@ def _measured_in_plane(
         height = axis - GIRDLE_RISE * breadth
         readings = [
             BREADTH_OF_SPAN * span,
-            axes_distance_m(front, camera, distance_m, axis, height, span, left),
-            _BREADTH_OF_WIDTH * width_m(front, camera, distance_m, axis),
+            _BREADTH_OF_AXES * axes_distance_m(front, camera, distance_m, axis, height, span, left),
+            _BREADTH_OF_WIDTH * width_m(front, camera, distance_m, axis - _SHOULDERS_BELOW * span),
         ]
         breadth = combined(np.array(readings), _BREADTH_SD)
     drop = np.arctan((abs(left.slope) + abs(right.slope)) / 2.0)
