@@ -13,6 +13,7 @@ compared by chroma, and soft shadows are distinguished from dark clothes.
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import cv2
@@ -78,6 +79,10 @@ _EDGE = 0.35
 _LEAST_COLOR_CONTRAST, _COLOR_EDGE = 7.0, 0.45
 # Largest darkening by a soft shadow, as a share of the background's brightness.
 _DARKEST_SHADOW = 0.4
+# Largest change of the brightness of the whole scene that is compensated if light is not followed.
+_FLICKER = 0.1
+# Number of pixels whose median estimates the brightness of the scene.
+_BRIGHTNESS_SAMPLES = 1000
 # Margin around the foreground, and around the part that is compared by colour.
 _MARGIN_PX = 8
 # One image in this many is compared by colour everywhere, not only near the foreground.
@@ -91,6 +96,8 @@ class SilhouetteExtractor:
         """Prepare the thresholds of every pixel."""
         self.config = config = settings_or(BackgroundConfig(), config)
         self.gain = 1.0
+        step = max(1, math.isqrt(model.mean.size // _BRIGHTNESS_SAMPLES))
+        self._grid = (slice(None, None, step), slice(None, None, step))
         self._light: LightFollower | None = None
         self._chroma: ChromaScore | None = None
         self._learned = model
@@ -114,6 +121,7 @@ class SilhouetteExtractor:
         darker = np.maximum(brighter, config.shadow * model.mean)
         self._brighter = np.asarray(1.0 / brighter, dtype=np.float32)
         self._darker = np.asarray(-1.0 / darker, dtype=np.float32)
+        self._grid_mean = np.maximum(model.mean[self._grid], 1.0)
         self._per_level = np.asarray(1.0 / np.maximum(model.mean, DARKEST), np.float32)
         before, self._chroma = self._chroma, None
         if model.chroma is not None and config.color:
@@ -164,8 +172,10 @@ class SilhouetteExtractor:
             difference = np.abs(brightness - self.model.mean)
             return np.asarray(np.uint8(255) * ~(difference < self._limit))
         signed = self._signed
-        expected, shares = self.model.mean, (1.0, -1.0)
-        if self._light is not None:
+        if self._light is None:
+            self.gain = self._scene_gain(brightness)
+            expected, shares = self.model.mean, (1.0, -self.gain)
+        else:
             expected, factor = self._light.follow(brightness)
             self.gain = self._light.level
             # More light increases contrasts, and the limits belong to the learned light.
@@ -223,6 +233,15 @@ class SilhouetteExtractor:
         """Expect that the light of the next image differs from that of the learned background."""
         if self._light is not None:
             self._light.expect_step()
+
+    def _scene_gain(self, brightness: ImageArray) -> float:
+        """Return the brightness relative to the background: a median, since the person is small."""
+        ratios = (brightness[self._grid] / self._grid_mean).ravel()
+        middle = len(ratios) // 2
+        ratio = float(np.partition(ratios, middle)[middle])  # the median, without its checks
+        if abs(ratio - 1.0) > _FLICKER:
+            return 1.0
+        return ratio
 
 
 def warm_up() -> None:

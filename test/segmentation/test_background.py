@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from cardbox_tracker.segmentation import background
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
@@ -147,6 +148,26 @@ def test_a_shadow_is_not_the_person() -> None:
     assert np.count_nonzero(SilhouetteExtractor(flat(150, 2), without)(shadow)) > 3000
     # Only what is darker can be a shadow.
     assert np.count_nonzero(SilhouetteExtractor(flat(150, 2))(image(150, 165))) > 3000
+
+
+@pytest.mark.parametrize("gain", [0.94, 1.06])
+def test_a_scene_that_flickers_stays_background(
+    gain: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    model = flat(200, 2)
+    extractor = SilhouetteExtractor(model, BackgroundConfig(follow=False))
+    got = extractor(image(200 * gain, 100 * gain))
+    assert extractor.gain == pytest.approx(gain, abs=1e-6)
+    assert np.count_nonzero(got != person_mask()) <= 8
+    monkeypatch.setattr(background, "_FLICKER", 0.0)
+    rigid = SilhouetteExtractor(model, BackgroundConfig(follow=False, shadow=0.0))
+    assert np.all(rigid(image(200 * gain)) == 255)
+
+
+def test_a_larger_change_than_flicker_is_not_followed() -> None:
+    extractor = SilhouetteExtractor(flat(100, 2), BackgroundConfig(follow=False))
+    extractor(image(130))
+    assert extractor.gain == 1.0
 
 
 def test_specks_are_dropped_and_persons_kept() -> None:

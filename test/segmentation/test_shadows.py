@@ -71,6 +71,7 @@ def test_what_is_darker_than_a_shadow_can_be_is_the_person(
 ) -> None:
     # Across the whole image from bright to half as bright, without any edge.
     picture = np.tile(np.linspace(LEVEL, LEVEL / 2, W), (H, 1)).round().astype(np.uint8)
+    monkeypatch.setattr(background, "_FLICKER", 0.0)
     found = extractor(follow=False)(picture)
     assert not found[:, : int(0.75 * W)].any() and found[:, int(0.85 * W) :].all()
     monkeypatch.setattr(background, "_DARKEST_SHADOW", 0.6)
