@@ -7,8 +7,8 @@ the arms are measured before the fit, with the proportions of people:
 1. Each arm of ``arms`` is traced from the fingertips to the armpit; a line through its middle,
    without what hangs of a sleeve, is the arm's axis. The span is the distance between the
    fingertips.
-2. The axes of the level arms are the height of the shoulder joints, less the rise of the girdle.
-   Arms and shoulders are nearer than the hips by the depth of :mod:`.shoulders`.
+2. The height of the shoulder joints and their depth against the hips are those of
+   :mod:`.shoulders`. Arms and shoulders are nearer than the hips by that depth.
 3. The breadth has three readings: the distance of the axes of the hanging arms in ``front`` at the
    joints' height, the width of the shoulders there, and the span. They are averaged by their
    precision, with less weight for outliers.
@@ -29,8 +29,8 @@ import numpy as np
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.outline import axes_distance_m, level_arm, span_m, width_m
-from cardbox_tracker.measuring.references import Silhouette
-from cardbox_tracker.measuring.shoulders import GIRDLE_RISE, robust_mean, shoulders_forward_m
+from cardbox_tracker.measuring.references import Silhouette, lateral_m
+from cardbox_tracker.measuring.shoulders import robust_mean, shoulder_height_m, shoulders_forward_m
 from cardbox_tracker.person.sizes import FloatArray
 
 KNUCKLES_SHARE = 0.876
@@ -106,9 +106,10 @@ def _measured_in_plane(
     breadth = BREADTH_OF_SPAN * span
     half = breadth / 2.0
     axis = float(np.mean([left.axis_m(centre + half), right.axis_m(centre - half)]))
+    middle = lateral_m(front, camera, distance_m)
     # Height and breadth depend on each other; the first height uses the breadth from the span.
     for _ in range(2):
-        height = axis - GIRDLE_RISE * breadth
+        height = shoulder_height_m(front, camera, distance_m, axis, middle, breadth, span)
         readings = [
             BREADTH_OF_SPAN * span,
             _BREADTH_OF_AXES * axes_distance_m(front, camera, distance_m, axis, height, span, left),
