@@ -51,9 +51,9 @@ def silhouette(body: BodyModel, raised_rad: float = 0.0) -> np.ndarray:
 class Followed:
     """A session of one person, who is measured."""
 
-    def __init__(self, only_measures: bool = False, seed: int = 1, **given: float) -> None:
+    def __init__(self, only_measures: bool = False, **given: float) -> None:
         guess = body_from_proportions(1.75, **given)  # type: ignore[arg-type]
-        given_all = [guess], CAMERA, default_preset(), np.random.default_rng(seed)
+        given_all = [guess], CAMERA, default_preset(), np.random.default_rng(1)
         self._session = Session(*given_all, only_measures=only_measures)
 
     def track(self, silhouette: np.ndarray) -> Estimate:
@@ -271,7 +271,7 @@ def test_a_new_version_of_the_body_goes_on_with_the_posture(
 
 
 def test_who_comes_in_at_a_side_is_measured_when_the_trunk_is_in_the_image() -> None:
-    track = Followed(seed=10, distance_m=2.0)
+    track = Followed(distance_m=2.0)
     true = person(1.75, -0.62)
     for lateral_m in np.linspace(1.3, 0.0, 27):
         # The side of the image is 1.07 m from its middle there; arms may be beyond it.
