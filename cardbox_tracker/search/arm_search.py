@@ -40,16 +40,18 @@ def propose_arms(
     """Return arms (N, 4), 0 left or 1 right, for the torso of the first state of a pool.
 
     The states ``pool`` (M, 14) are before the camera of ``cost``, whose torso is fixed, the best
-    first. ``numbers`` are unit normal (N, 4) and uniform in 0..1 (N, 1); ``share`` is the number of
+    first. ``numbers`` are unit normal (N, 4) and uniform in 0..1 (N, 3); ``share`` is the number of
     cameras, by which the numbers of ``config`` are divided.
     """
     # With several cameras, rounding may leave fewer arms than these kinds need together.
     left = len(numbers[0]) - 1
     mirrors = min(config.arm_mirrors // share, left)
-    banked = min(config.banked_arms // share, left - mirrors)
-    kinds = config.survivors, config.arm_noise_rad, mirrors, banked
+    tips = min(config.arm_tips // share, left - mirrors)
+    banked = min(config.banked_arms // share, left - mirrors - tips)
+    kinds = config.survivors, config.arm_noise_rad, mirrors, tips, banked
     plan = *kinds, bank_of_arms(), ARM_LIMITS
-    return arm_proposals.propose_arms(pool, arm, plan, cost.body, numbers)
+    seen = cost.uncovered(arm), cost.counted
+    return arm_proposals.propose_arms(pool, arm, plan, *seen, cost.body, numbers)
 
 
 # Noise around the best arms, as a fraction of the usual noise.

@@ -19,6 +19,8 @@ from cardbox_tracker.person.posture import (
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.terms.kernel_arguments import Floats
 
+# Fraction of the noise that is added to a move by a difference.
+_NOISE_OF_DIFFERENCE = 0.2
 _LEFT, _RIGHT = FIRST_ANGLES
 
 
@@ -75,14 +77,19 @@ def combine(
 def move_all(
     sources: Floats,
     noise: Noise,
-    normals: Floats,
+    differing: int,
+    difference_scale: float,
+    numbers: Numbers,
 ) -> Floats:
     """Return states (N, 14) around ``sources`` (M, 14), all joints moved together.
 
     Every second state rotates about the shoulders. In the first half, states in turn move only the
-    torso, only the left arm, and only the right arm. ``normals`` are (N, 14).
+    torso, only the left arm, and only the right arm. The last ``differing`` states move by the
+    difference of two sources, which follows the flat directions of the cost (differential
+    evolution). ``numbers`` are (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
+    normals, uniforms = numbers
     n, m = normals.shape[0], sources.shape[0]
     states = np.empty((n, N_STATE))
     for i in range(n):
@@ -91,7 +98,13 @@ def move_all(
             state[d] = source[d] + sigma[d] * normals[i, d]
         if i % 2 == 1:
             pivot(state, source, lever_m)
-        if i < n // 2:
+        if i >= n - differing:
+            base = sources[(i - (n - differing)) % m]
+            one, other = sources[int(uniforms[i, 0] * m)], sources[int(uniforms[i, 1] * m)]
+            for d in range(N_STATE):
+                rest = _NOISE_OF_DIFFERENCE * (state[d] - source[d])
+                state[d] = base[d] + difference_scale * (one[d] - other[d]) + rest
+        elif i < n // 2:
             part = i % 3
             for d in range(N_STATE):
                 is_left = _LEFT <= d < _RIGHT

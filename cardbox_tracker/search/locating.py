@@ -58,6 +58,8 @@ class Walk:
         return copysign(_ASIDE_RAD * walking, self.way_m)
 
 
+# Deviation of the intersection, m: median columns of two cameras show different body points.
+_CROSSING_M = 0.1
 # Least sine of the angle between lines of sight that determine x.
 _LEAST_ANGLE = 0.05
 
@@ -69,6 +71,8 @@ class Location(NamedTuple):
     step_m: float  #: lateral motion of the middle since the last frame, metres
     #: ``torso_x`` of the intersection of the lines of sight; None with one camera.
     x_m: float | None = None
+    #: standard deviation of ``x_m``; None if the lines do not determine it.
+    x_stddev_m: float | None = None
 
 
 class Locator:
@@ -106,7 +110,8 @@ class Locator:
         x, y = crossing_of([self._line(*one) for one in bearings.items()], there)
         lowest_m, highest_m = self._cost.limits[TORSO_X].tolist()
         x_m = min(max(x + self._distance_m, lowest_m), highest_m)
-        return Location(y / max(-x, 1e-3), step_m, x_m)
+        stddev_m = None if list(seeing) == [0] else _CROSSING_M
+        return Location(y / max(-x, 1e-3), step_m, x_m, stddev_m)
 
     def _line(self, number: int, bearing: float) -> tuple[LevelPoint, LevelPoint]:
         if number:

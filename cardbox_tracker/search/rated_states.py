@@ -66,8 +66,8 @@ class RatedStates:
         return self.states[kept]
 
 
-# Uniform numbers per arm, and per torso.
-_OF_ARM, _OF_TORSO = 1, 2
+# Uniform numbers per arm, and per state.
+_OF_ARM, _OF_STATE = 3, 2
 
 
 class Draws:
@@ -82,12 +82,12 @@ class Draws:
         )
         arms = 2 * self._arms
         normals = (c.torsos + together) * N_STATE + (arms + 2 * self._near) * ARM_ANGLES
-        uniforms = c.torsos * _OF_TORSO + arms * _OF_ARM
+        uniforms = (c.torsos + together) * _OF_STATE + arms * _OF_ARM
         self._normals = _Numbers(rng.standard_normal(normals))
         self._uniforms = _Numbers(rng.random(uniforms))
 
     def for_arms(self) -> tuple[FloatArray, FloatArray]:
-        """Return normal numbers (N, 4) and uniform ones (N, 1) for N proposed arms of a side."""
+        """Return normal numbers (N, 4) and uniform ones (N, 3) for N proposed arms of a side."""
         count = self._arms
         return self._normals.take(count, ARM_ANGLES), self._uniforms.take(count, _OF_ARM)
 
@@ -95,13 +95,9 @@ class Draws:
         """Return normal numbers (N, 4) for the N arms of a side around the best ones."""
         return self._normals.take(self._near, ARM_ANGLES)
 
-    def for_torsos(self, count: int) -> tuple[FloatArray, FloatArray]:
+    def for_states(self, count: int) -> tuple[FloatArray, FloatArray]:
         """Return normal numbers (count, 14) and uniform ones (count, 2)."""
-        return self.for_moves(count), self._uniforms.take(count, _OF_TORSO)
-
-    def for_moves(self, count: int) -> FloatArray:
-        """Return normal numbers (count, 14)."""
-        return self._normals.take(count, N_STATE)
+        return self._normals.take(count, N_STATE), self._uniforms.take(count, _OF_STATE)
 
 
 class _Numbers:

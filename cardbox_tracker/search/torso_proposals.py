@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import pi
+
 import numpy as np
 
 from cardbox_tracker.common.compiling import kernel
@@ -12,11 +14,16 @@ from cardbox_tracker.person.kinematics import (
     side_of,
     state_pose,
 )
-from cardbox_tracker.person.posture import N_STATE, TORSO_X, TORSO_Y, YAW
+from cardbox_tracker.person.posture import FIRST_ANGLES, N_STATE, PITCH, TORSO_X, TORSO_Y, YAW
 from cardbox_tracker.search.joint_moves import Noise, Numbers, clip_state, pivot
 from cardbox_tracker.search.state_choice import least_of
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, Floats, body_of
 
+# Explorers: half of them bow within this range, two fifths get any yaw, the others mirror the yaw;
+# the distance of all has this deviation, m.
+_BOW_FROM_RAD, _BOW_RANGE_RAD = -5.0 * pi / 180.0, 60.0 * pi / 180.0
+_BOWING, _BOWING_OR_TURNING = 0.5, 0.9
+_EXPLORERS_X_M = 0.06
 # Fraction of the upright torsos with any yaw, since people walk in sideways; deviation of the yaw
 # of the others, which face the camera, rad.
 _FRESH_TURNED, _FRESH_YAW_RAD = 0.5, 0.3
@@ -33,6 +40,7 @@ def propose_torsos(
     survivors: Floats,
     noise: Noise,
     step_m: float,
+    explorers: int,
     upright: Upright,
     numbers: Numbers,
 ) -> Floats:
@@ -40,7 +48,8 @@ def propose_torsos(
 
     Every second torso rotates about the shoulders. Half of either kind moves by ``step_m``, the
     lateral step of the silhouette, because a walking person moves further than the noise. The last
-    ones stand upright. ``numbers`` are (N, 14) and (N, 2).
+    ``explorers`` bow, turn or mirror their yaw; the last of these stand upright. ``numbers`` are
+    (N, 14) and (N, 2).
     """
     sigma, limits, lever_m = noise
     fresh, fresh_state, fresh_x_m, sight, distance_m = upright
@@ -54,9 +63,19 @@ def propose_torsos(
         if (i // 2) % 2 == 1:
             state[TORSO_Y] += step_m
         clip_state(state, limits)
-        if i < n - fresh:
+        if i < n - explorers:
             if i % 2 == 1:
                 pivot(state, source, lever_m)
+        elif i < n - fresh:
+            kind, value = uniforms[i, 0], uniforms[i, 1]
+            if kind < _BOWING:
+                state[PITCH] = _BOW_FROM_RAD + _BOW_RANGE_RAD * value
+            elif kind < _BOWING_OR_TURNING:
+                state[YAW] = limits[YAW, 0] + (limits[YAW, 1] - limits[YAW, 0]) * value
+            else:
+                state[YAW] = limits[YAW, 0] + limits[YAW, 1] - state[YAW]
+            # The random numbers of the arms are not used otherwise.
+            state[TORSO_X] += _EXPLORERS_X_M * normals[i, FIRST_ANGLES[0]]
         else:
             for d in range(N_STATE):
                 state[d] = fresh_state[d]

@@ -46,8 +46,10 @@ from cardbox_tracker.terms.silhouette import SilhouetteTerm
 from cardbox_tracker.terms.term import Frame, Posed, Term
 from cardbox_tracker.terms.whole_body import iou_of
 
-# Deviation of ``torso_x`` of upright torsos, m.
-_UPRIGHT_X_M = 0.25
+# Deviation of ``torso_x`` of upright torsos, which is larger in the first frames of a search.
+_SETTLED_X_M, _YOUNG_X_M = 0.25, 0.5
+# Lateral step, m, after which the legs have left their last columns.
+_STEP_M = 0.05
 # Factor on the numbers of states in a frame whose cues tell where joints are.
 _LOCATED_EFFORT = 0.25
 # States that are fitted to such cues: number, number of similar ones, least distance of the others,
@@ -170,9 +172,11 @@ class WholeBodyFilter:
         if self._is_new or self._is_lost:
             given = self._survivors, self._reference, location.bearing, self._is_new
             self._survivors = self.approach.with_upright(self._cost, frames, *given)
-        if self._is_new:
+        moved = self._survivors[0].copy()
+        moved[TORSO_Y] += location.step_m
+        if self._is_new or abs(location.step_m) > _STEP_M:
             # The pixels of the legs depend on the place of the person.
-            self._cost.see([frame.silhouette for frame in frames], self._survivors[0])
+            self._cost.see([frame.silhouette for frame in frames], moved)
             self._cost.choose(self._seeing)
         self._age += not self._is_new
         for _ in range(passes):
@@ -211,9 +215,11 @@ class WholeBodyFilter:
         """Rate survivors and new torsos with arms; of a new person, also arms of upright ones."""
         profile, cost, before = search.profile, self._cost, search.before
         location = search.location
+        is_settled = not self._is_new and self._age > doubt.SETTLED_FRAMES
         fresh = self._reference.copy()
         fresh[TORSO_X] = before[TORSO_X] if location.x_m is None else location.x_m
-        upright = profile.fresh_torsos
+        fresh_x_m = location.x_stddev_m or (_SETTLED_X_M if is_settled else _YOUNG_X_M)
+        upright = profile.fresh_torsos if is_settled else profile.torso_explorers
         noise = profile.noise()
         # The arms of a torso keep their angles.
         noise[LEFT_ARM] = noise[RIGHT_ARM] = 0.0
@@ -221,8 +227,9 @@ class WholeBodyFilter:
             self._survivors,
             (noise, cost.limits, _lever_m(cost)),
             location.step_m,
-            (upright, fresh, _UPRIGHT_X_M, location.bearing, float(cost.place[0])),
-            search.draws.for_torsos(profile.torsos),
+            profile.torso_explorers,
+            (upright, fresh, fresh_x_m, location.bearing, float(cost.place[0])),
+            search.draws.for_states(profile.torsos),
         )
         ratings = cost.torsos(torsos, before)
         pool = torso_proposals.pool_of(
@@ -276,7 +283,7 @@ class WholeBodyFilter:
         return self.refine(states, self._cues, prior, _FITTED_STEPS, _FITTED_DAMPING)[0]
 
     def together(self, search: Search) -> None:
-        """Move all joints of the best states together."""
+        """Move all joints of the best states together, and by the differences of others."""
         profile, rated = search.profile, self.rated
         sigma = profile.together_noise * profile.noise()
         sources = rated.different(profile.survivors, profile.alike, profile.apart_m)
@@ -286,7 +293,9 @@ class WholeBodyFilter:
             moved = joint_moves.move_all(
                 sources,
                 (sigma, self._cost.limits, _lever_m(self._cost)),
-                search.draws.for_moves(profile.together),
+                int(profile.differing * profile.together),
+                profile.difference_scale,
+                search.draws.for_states(profile.together),
             )
             rated.add(moved)
             sigma = profile.round_decay * sigma

@@ -21,9 +21,11 @@ _LEAST_TOTALS = MappingProxyType(
 _LEAST_PARTS = MappingProxyType(
     {
         "alike": 1,
+        "torso_explorers": 0,
         "fresh_torsos": 0,
         "best_torsos": 1,
         "arm_mirrors": 0,
+        "arm_tips": 0,
         "banked_arms": 0,
         "best_arms": 1,
         "paired_arms": 1,
@@ -42,7 +44,10 @@ class SearchProfile:
     alike: int = 12  #: survivors that may be similar; each other one differs from all better ones
     apart_m: float = 0.12  #: least distance of different survivors, m
     torsos: int = 70  #: torsos that are rated
-    fresh_torsos: int = 8  #: number of the torsos that stand upright at the silhouette's place
+    torso_explorers: int = 16  #: number of the torsos that bow or turn by any angle
+    #: number of the torso_explorers that stand upright at the place of the silhouette; at first,
+    #: all of them do.
+    fresh_torsos: int = 8
     #: best torsos that are rated with arms, both moved along and fixed in space.
     best_torsos: int = 12
     arms: int = 90  #: arms that are proposed per side
@@ -50,12 +55,18 @@ class SearchProfile:
     #: cameras propose four times as many arms and rate a quarter of them.
     candidates: int = 3
     arm_mirrors: int = 8  #: number of the arms that are survivors mirrored in depth
+    #: number of the arms that reach for foreground that the model leaves uncovered.
+    arm_tips: int = 10
     banked_arms: int = 20  #: number of the arms that are drawn from the learned prior
     best_arms: int = 15  #: best arms around which others are proposed
     arms_again: int = 51  #: arms that are proposed around the best ones
     paired_arms: int = 12  #: best arms of either side that are combined
     rounds: int = 2  #: rounds in which all joints move together
     together: int = 36  #: states in such a round
+    # Differences of survivors follow flat directions of the cost (Storn & Price,
+    # "Differential Evolution", 1997).
+    differing: float = 0.4  #: fraction of these states that move by the difference of two others
+    difference_scale: float = 0.6  #: factor on such a difference
     y_noise_m: float = 0.02  #: noise of the torso's y, m
     roll_noise_rad: float = 0.08  #: noise of the torso's roll, rad
     pitch_noise_rad: float = 0.08  #: noise of the torso's pitch, rad
@@ -102,9 +113,11 @@ SEVERAL_CAMERAS = replace(
     candidates=4,
     arms=360,
     arm_mirrors=32,
+    arm_tips=40,
     banked_arms=80,
     best_arms=20,
     arms_again=120,
+    differing=0.8,
     round_decay=0.8,
     smoothing=1.0 / 3.0,
 )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 
@@ -29,6 +30,7 @@ CAMERA = Camera(160, 120, 165.0, 165.0, 79.5, 59.5)
 BODY = BodyModel.of(hip_height_m=-0.51)
 ARM_LIMITS = np.ascontiguousarray(STATE_LIMITS[4:8])
 COST = WholeBodyCost(BODY, CAMERA, WholeBodyCostConfig())
+STIFF = WholeBodyCost(BODY.rigid, CAMERA, WholeBodyCostConfig())
 
 
 def seen(posture: np.ndarray) -> np.ndarray:
@@ -94,19 +96,59 @@ def test_survivors_are_the_best_and_then_apart() -> None:
     assert alike.tolist() == list(range(16))
 
 
-def arms_for(state: np.ndarray, arm: int, **counts: int) -> np.ndarray:
-    """40 proposals for an arm, of them so many mirrors and banked ones."""
+def arms_for(
+    silhouette: np.ndarray, state: np.ndarray, arm: int, of: WholeBodyCost = COST, **counts: int
+) -> np.ndarray:
+    """40 proposals for an arm, of them so many mirrors, tips and banked ones."""
     rng = np.random.default_rng(0)
+    of.see(silhouette, state)
+    of.fix_torso(state)
     bank = np.tile([0.1, 0.2, 0.3, 0.4], (5, 1))
-    kinds = [counts.get(kind, 0) for kind in ("mirrors", "banked")]
-    plan = 16, 0.2, *kinds, bank, ARM_LIMITS
-    numbers = rng.standard_normal((40, 4)), rng.random((40, 1))
-    return arm_proposals.propose_arms(state[None], arm, plan, COST.body, numbers)
+    kinds = [counts.get(kind, 0) for kind in ("mirrors", "tips", "banked")]
+    return arm_proposals.propose_arms(
+        state[None],
+        arm,
+        (16, 0.2, *kinds, bank, ARM_LIMITS),
+        of.uncovered(arm),
+        of.counted,
+        of.body,
+        (rng.standard_normal((40, 4)), rng.random((40, 3))),
+    )
+
+
+@pytest.mark.parametrize("arm", [0, 1])
+def test_a_tip_puts_the_hand_on_the_pixel(arm: int) -> None:
+    state = upright()
+    silhouette = np.zeros((120, 160), np.uint8)
+    shoulder = CAMERA.project(COST.keypoints(state)[3 * arm])
+    tip = shoulder + np.array([30.0 * (1 - 2 * arm), -20.0])
+    cv2.circle(silhouette, (round(tip[0]), round(tip[1])), 8, 255, -1)
+    arms = arms_for(silhouette, state, arm, tips=30, of=STIFF)[-30:]
+    limits = ARM_LIMITS.T
+    free = [angles for angles in arms if not np.any(np.isclose(angles, limits, atol=1e-9))]
+    assert len(free) > 5, "joint limits hold for the others"
+    hands = []
+    for angles in free:
+        found = state.copy()
+        found[4 + 4 * arm : 8 + 4 * arm] = angles
+        hands.append(STIFF.keypoints(found)[3 * arm + 2])
+    pixels = CAMERA.project(np.array(hands))
+    # All at one pixel of what was uncovered, at different depths.
+    np.testing.assert_allclose(pixels, np.tile(pixels[0], (len(pixels), 1)), atol=1e-6)
+    assert silhouette[round(pixels[0, 1]), round(pixels[0, 0])] == 255
+    assert np.ptp(np.array(hands)[:, 2]) > 0.1
+
+
+def test_without_anything_uncovered_nothing_reaches() -> None:
+    state = upright()
+    with_tips = arms_for(np.zeros((120, 160), np.uint8), state, 0, tips=12)
+    without = arms_for(np.zeros((120, 160), np.uint8), state, 0)
+    np.testing.assert_array_equal(with_tips, without)
 
 
 def test_the_first_proposal_is_the_best_arm_and_the_bank_is_used() -> None:
     state = upright()
-    arms = arms_for(state, 0, banked=7)
+    arms = arms_for(np.zeros((120, 160), np.uint8), state, 0, banked=7)
     np.testing.assert_array_equal(arms[0], state[4:8])
     np.testing.assert_array_equal(arms[-7:], np.tile([0.1, 0.2, 0.3, 0.4], (7, 1)))
 
@@ -117,7 +159,7 @@ def test_a_mirrored_arm_points_to_the_other_side_in_depth(arm: int) -> None:
     state = upright()
     first = 4 + 4 * arm
     state[first : first + 4] = 1.2, 0.5, 0.1, 0.4
-    mirrored = arms_for(state, arm, mirrors=20)[-20:]
+    mirrored = arms_for(np.zeros((120, 160), np.uint8), state, arm, mirrors=20)[-20:]
     side = 1.0 - 2.0 * arm
     before = np.concatenate(arm_directions(state[first : first + 4], side))
     shoulder = COST.keypoints(state)[3 * arm]
@@ -146,6 +188,7 @@ def test_torsos_that_turn_about_the_shoulders_leave_them_where_they_are() -> Non
         upright()[None],
         (sigma, STATE_LIMITS, lever_m),
         0.0,
+        0,
         (0, upright(), 0.0, 0.0, 2.0),
         (rng.standard_normal((20, 14)), rng.random((20, 2))),
     )

@@ -139,7 +139,7 @@ def another(name: str, value: Any, setting: Setting) -> Any:
 
 TOTALS = ("survivors", "torsos", "arms", "arms_again", "together", "average")
 PARTS = (
-    *("alike", "fresh_torsos", "best_torsos", "arm_mirrors"),
+    *("alike", "torso_explorers", "fresh_torsos", "best_torsos", "arm_mirrors", "arm_tips"),
     *("banked_arms", "best_arms", "paired_arms"),
 )
 
@@ -166,9 +166,9 @@ def test_any_effort_scales_all_numbers_of_states(
     assert {name: getattr(scaled, name) for name in rest} == rest
     # Parts do not exceed their totals.
     assert 1 <= scaled.alike <= scaled.survivors
-    assert scaled.fresh_torsos <= scaled.torsos
+    assert scaled.fresh_torsos <= scaled.torso_explorers <= scaled.torsos
     assert scaled.best_torsos <= scaled.torsos
-    assert scaled.arm_mirrors + scaled.banked_arms < scaled.arms
+    assert scaled.arm_mirrors + scaled.arm_tips + scaled.banked_arms < scaled.arms
     assert min(scaled.best_arms, scaled.paired_arms) >= 1
     assert max(scaled.best_arms, scaled.paired_arms) <= scaled.arms + scaled.arms_again
 
