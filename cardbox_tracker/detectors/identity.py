@@ -168,8 +168,13 @@ class Identity:
         if self._figure is not None and now_ns - self._anybody_ns > _EMPTY_NS:
             self.forget()
 
-    def is_same(self, figure: Figure, colours: FloatArray | None, now_ns: int) -> bool:
-        """Return whether this is the person, by place and trunk ``colours``, or the first one."""
+    def is_same(
+        self, figure: Figure, colours: FloatArray | None, now_ns: int, is_sure: bool = True
+    ) -> bool:
+        """Return whether this is the person, by place and trunk ``colours``, or the first one.
+
+        Colours are learned if ``is_sure`` says that the figure is where the person is.
+        """
         self.nobody(now_ns)
         self._anybody_ns = now_ns
         away_ns = abs(now_ns - self._seen_ns)
@@ -185,7 +190,7 @@ class Identity:
         self._figure, self._seen_ns, self._is_away = figure, now_ns, False
         self._images += 1
         self._others.count(self.is_other(colours))
-        if colours is not None and not self._others.value:
+        if is_sure and colours is not None and not self._others.value:
             self._colours = learned(self._colours, colours)
         return True
 

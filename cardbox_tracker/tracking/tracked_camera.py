@@ -252,11 +252,14 @@ class TrackedCamera:
         upper = np.ascontiguousarray(frame.silhouette[: self._rows])
         return frame.changed(rows=self._rows, foreground_px=cv2.countNonZero(upper))
 
-    def shows_other(self, frame: Frame, state: FloatArray | None, now_ns: int) -> bool:
+    def shows_other(
+        self, frame: Frame, state: FloatArray | None, now_ns: int, is_sure: bool
+    ) -> bool:
         """Return whether the person in the first camera's last frame is somebody else.
 
         That is so if its points were those of somebody else and there is no ``state`` (14,). A
-        state without points must be where the person can be, with their colours.
+        state without points must be where the person can be, with their colours, which are those
+        of states that are sure.
         """
         if self.identity.is_new or state is None:
             return self._sees_other
@@ -265,7 +268,7 @@ class TrackedCamera:
         figure, silhouette = self.figure(state), frame.silhouette
         trunk = figure.trunk(silhouette.shape)
         is_seen, colours = (trunk & silhouette).any(), colours_in(frame.image, trunk)
-        return not is_seen or not self.identity.is_same(figure, colours, now_ns)
+        return not is_seen or not self.identity.is_same(figure, colours, now_ns, is_sure)
 
     def _channels(self, observation: Observation | None) -> dict[str, Any]:
         """Return the data of all channels, checked and turned upright."""

@@ -260,7 +260,8 @@ class Tracker:
         is_found = estimate.posture is not None
         reason = self._doubt_about(frames[0]) if is_found else ""
         found = self._before if is_found else None
-        if self._is_alone and first.shows_other(frames[0], found, self._now_ns):
+        is_sure = estimate.state == TRACKING
+        if self._is_alone and first.shows_other(frames[0], found, self._now_ns, is_sure):
             estimate = Estimate(LOST)
             if is_found:
                 self._before = None

@@ -30,6 +30,7 @@ from cardbox_tracker.search.whole_body_config import (
     SearchProfile,
     WholeBodyConfig,
 )
+from cardbox_tracker.tracking.estimate import LOST
 from cardbox_tracker.tracking.observation import Observation
 from cardbox_tracker.tracking.tracker import Tracker
 
@@ -107,7 +108,7 @@ def scenes() -> tuple[tuple[np.ndarray, np.ndarray, ImagePoints | None], ...]:
     return (*found, *[(*drawn(elsewhere), None)] * 6)
 
 
-def result_of(config: TrackerConfig, seed: int) -> list[Any]:
+def result_of(config: TrackerConfig, seed: int = 0) -> list[Any]:
     """What is estimated of the scenes, as bytes."""
     tracker = Tracker(body(), CAMERA, config, np.random.default_rng(seed))
     found: list[Any] = []
@@ -119,8 +120,8 @@ def result_of(config: TrackerConfig, seed: int) -> list[Any]:
 
 
 @cache
-def usual(preset: str, seed: int) -> list[Any]:
-    return result_of(PRESETS[preset](), seed)
+def usual(preset: str) -> list[Any]:
+    return result_of(PRESETS[preset]())
 
 
 def another(name: str, value: Any, setting: Setting) -> Any:
@@ -135,6 +136,12 @@ def another(name: str, value: Any, setting: Setting) -> Any:
     if isinstance(value, int):
         return value - 1 if value > low and value > 2 else value + 1
     return low + 0.3 * (value - low) if value > low else min(high, value + 0.3)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_noise_makes_nobody_else_of_the_person(seed: int) -> None:
+    """A posture that follows noise does not show the person's colours."""
+    assert all(state != LOST for state, *_ in result_of(PRESETS["default"](), seed)[-3:])
 
 
 TOTALS = ("survivors", "torsos", "arms", "arms_again", "together", "average")
@@ -250,5 +257,4 @@ def test_a_setting_acts_or_is_refused_with_the_one_that_does(
             assert config.changed(nested({instead: another(*cases[instead])})) != config
         return
     assert changed != config
-    # With some seeds, the stripes make somebody else of the person, who is not followed any more.
-    assert any(result_of(changed, seed) != usual(preset, seed) for seed in (0, 1))
+    assert result_of(changed) != usual(preset)
