@@ -70,6 +70,7 @@ LARGEST_STDDEV_RAD = np.radians(20.0)
 _N = len(NECK_LIMITS)
 # Angles of the torso about the axes of the neck.
 _OF_TORSO = [YAW, PITCH, ROLL][:_N]
+_BEYOND_LIMITS_RAD = np.radians(15.0)
 _FARTHEST_M = 0.3
 
 # Standard deviations: face model and detector in metres at the face, detector in pixels.
@@ -126,12 +127,12 @@ def fit_neck(
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
     rms = float(np.sqrt(found.total[best] / (2 * np.count_nonzero(known))))
     angles = values[:_N]
-    beyond = (angles < NECK_LIMITS[:, 0]) | (angles > NECK_LIMITS[:, 1])
+    beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
     stddev = np.sqrt(np.diag(np.linalg.inv(information))[:_N]) * max(1.0, rms)
     is_face = rms <= LARGEST_RMS and np.hypot(*values[3:5]) <= _FARTHEST_M
-    if not is_face or beyond.any() or (stddev > LARGEST_STDDEV_RAD).any():
+    if not is_face or (beyond > _BEYOND_LIMITS_RAD).any() or (stddev > LARGEST_STDDEV_RAD).any():
         return None
-    return Neck(angles, stddev)
+    return Neck(np.clip(angles, NECK_LIMITS[:, 0], NECK_LIMITS[:, 1]), stddev)
 
 
 @inlined_kernel
