@@ -79,8 +79,8 @@ _POINT_M, _POINT_PX = 0.010, 1.0
 _STDDEVS = np.array([*np.radians([60.0, 40.0, 15.0]), 0.15, 0.15, 0.10])
 _RULES = rules_of(6, inverse=_STDDEVS**-2.0)
 
-SMOOTHING = 0.5
-"""Weight of the last output in the next one."""
+SMOOTHING_S, MOST_KEPT = 0.15, 0.5
+"""Time constant of the smoothing, s, and largest weight of the last output."""
 _DRIFT_RAD_S = 1.0
 
 
@@ -176,11 +176,20 @@ def _solve(given: _Given) -> Equations:
     return minimize_compiled(_write_residuals, rows, np.zeros((1, 6)), _RULES, ENDS)
 
 
+def low_passed(before: FloatArray, values: FloatArray, interval_s: float) -> FloatArray:
+    """Return values (n,) after first-order smoothing, ``interval_s`` after the output ``before``.
+
+    y = a y_before + (1 - a) x with a = exp(-dt / time constant), but at most 1/2. A ramp is delayed
+    by dt a / (1 - a): less than the time constant, and never more than one interval.
+    """
+    kept = min(exp(-interval_s / SMOOTHING_S), MOST_KEPT)
+    return kept * before + (1.0 - kept) * values
+
+
 class HeadTracker:
     """Adds the direction of the head to the estimates of one person, smoothed over time.
 
-    The smoothing delays a motion by one interval. A face that is hidden for less than half a second
-    keeps its direction, with a growing deviation.
+    A face that is hidden for less than half a second keeps its direction, with a growing deviation.
     """
 
     def __init__(self, body: BodyModel, camera: Camera) -> None:
@@ -197,7 +206,7 @@ class HeadTracker:
         neck = self._fit(frame.points, found)
         if neck is not None:
             if self._last is not None:
-                angles = SMOOTHING * self._last.angles + (1.0 - SMOOTHING) * neck.angles
+                angles = low_passed(self._last.angles, neck.angles, self._age_s)
                 neck = neck._replace(angles=angles)
             self._last, self._age_s = neck, 0.0
         if self._last is None or found.posture is None:

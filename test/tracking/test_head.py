@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import cos, radians, sin
+from math import cos, exp, radians, sin
 from typing import Any
 
 import numpy as np
@@ -191,13 +191,16 @@ def test_the_direction_is_smoothed_and_kept_for_a_moment() -> None:
     assert np.degrees(again.neck[0]) == pytest.approx(40.0, abs=2.0)
 
 
-def test_the_last_direction_keeps_half_of_its_weight() -> None:
+@pytest.mark.parametrize(("interval_s", "kept"), [(0.05, 0.5), (0.3, exp(-2.0))])
+def test_the_last_direction_keeps_half_or_less_of_its_weight(
+    interval_s: float, kept: float
+) -> None:
     tracker, alone = HeadTracker(BODY, CAMERA), HeadTracker(BODY, CAMERA)
-    first = tracker.see(frame(face(0, 0)), ESTIMATE).neck
-    found = tracker.see(frame(face(40, 0)), ESTIMATE).neck
+    first = tracker.see(frame(face(0, 0), interval_s), ESTIMATE).neck
+    found = tracker.see(frame(face(40, 0), interval_s), ESTIMATE).neck
     turned = alone.see(frame(face(40, 0)), ESTIMATE).neck
     assert first is not None and turned is not None and found is not None
-    np.testing.assert_allclose(found, 0.5 * first + 0.5 * turned, atol=1e-12)
+    np.testing.assert_allclose(found, kept * first + (1.0 - kept) * turned, atol=1e-12)
 
 
 def test_a_lost_person_has_no_direction() -> None:
