@@ -13,15 +13,20 @@ A detector that estimates its points in space, too, shows the scale at once
 (:func:`distance_of_points`). It is compared with a second source: the given distance, depth images,
 or a further camera.
 
-Where a side of the image cuts the trunk, an outline does not show its breadth, so no place is sure.
+One outline without points may be that of somebody who has turned aside, or of somebody who stands
+farther away with other arms. The wrong one fits worse, and an outline from aside lacks the breadth
+of the shoulders. So what has changed of the distance since an outline from the front or from behind
+fitted as usual is a deviation, too. Where a side of the image cuts the trunk, an outline does not
+show its breadth, so no place is sure.
 """
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import erfc, hypot, log, sqrt, tan
+from math import cos, erfc, hypot, log, sqrt, tan
 
 import numpy as np
 
@@ -33,7 +38,7 @@ from cardbox_tracker.measuring.people_camera import DISTANCE_STDDEV
 from cardbox_tracker.measuring.scene_camera import GUESSED
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import MEASURED, BodyModel
-from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y
+from cardbox_tracker.person.posture import N_JOINTS, PITCH, TORSO_Y, YAW
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.estimate import Estimate, Place
@@ -48,6 +53,10 @@ and people of one stature differ in the lengths of trunk and arms by 4 to 6 %.""
 # Seconds over which two sources are compared, and the relative deviation of the distance of points
 # (0.89 to 1.11 of the true one in 32 recordings).
 _COMPARED_S, _POINTS_STDDEV = 1.5, 0.045
+
+# Outlines fit as usual from this share of a quantile of the latest overlaps on; least cosine of the
+# yaw of who is not seen from aside.
+_FITS, _USUAL, _LATEST, _ACROSS = 0.96, 0.8, 150, sqrt(0.5)
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # Lengths between a detector's points as shares of the length of an arm up to the knuckles, whose
@@ -127,6 +136,7 @@ class PlaceWatch:
         self._compared = Verdict("distance", lambda one, other: abs(log(one / other)) / stddev)
         self._first_ns: int | None = None
         self._apart_m = 0.0
+        self._ious, self._fitted_m = deque[float](maxlen=_LATEST), np.nan
         self.contradiction, self.is_too_large, self.scale = "", False, 1.0
         if earlier is not None:
             # Neither source depends on the version, and some posture misleads the points later.
@@ -172,6 +182,8 @@ class PlaceWatch:
             shorter = hypot(tan(tilt.pitch_rad), tilt.pitch_stddev_rad / sqrt(2.0))
             relative = hypot(relative, shorter * tilt.pitch_stddev_rad, body.stature_stddev)
         off_m = hypot(relative * distance_m, self._apart_m)
+        if rests_on == self._scale:
+            off_m = hypot(off_m, self._changed_m(estimate, frame, distance_m))
         aside_m = relative * abs(float(estimate.posture[TORSO_Y]))
         height_m = hypot(relative * (place.hip_height_m + z_m), distance_m * tilt.pitch_stddev_rad)
         chance = erfc(FAR_M / (sqrt(2.0) * off_m))
@@ -185,6 +197,17 @@ class PlaceWatch:
         if rests_on == self._scale and frame["points"] is None and is_cut(frame.silhouette):
             contradiction = contradiction or "a side of the image cuts the person"
         return Place(stddev_m, chance, rests_on, contradiction)
+
+    def _changed_m(self, estimate: Estimate, frame: Frame, distance_m: float) -> float:
+        """Return how far the distance is from that at which an outline fitted as usual, m."""
+        is_known = np.isnan(self._fitted_m) or frame["points"] is not None
+        if estimate.iou is not None and estimate.posture is not None:
+            self._ious.append(estimate.iou)
+            is_usual = estimate.iou >= _FITS * np.quantile(self._ious, _USUAL)
+            is_known |= is_usual and abs(cos(estimate.posture[YAW])) >= _ACROSS
+        if is_known:
+            self._fitted_m = distance_m
+        return abs(distance_m - self._fitted_m)
 
     def _compare(self, estimate: Estimate, body: BodyModel, rests_on: str, frame: Frame) -> None:
         """Compare the distance of the points with that of a second source, for some seconds."""

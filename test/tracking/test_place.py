@@ -15,7 +15,7 @@ from cardbox_tracker.camera.rasterisation import render
 from cardbox_tracker.detectors.image_points import POINT_INDEX, POINT_NAMES, ImagePoints
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel, body_from_proportions
-from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.posture import YAW, reference_posture
 from cardbox_tracker.person.skeleton import KeypointState
 from cardbox_tracker.recordings.given_camera import GUESSED_STDDEV
 from cardbox_tracker.search.config import default_preset
@@ -247,3 +247,33 @@ def test_without_a_second_source_nothing_contradicts() -> None:
     for frame in frames(points_at(2.0)):
         watch.see(estimate_at(2.0, child), child, frame)
     assert watch.contradiction == ""
+
+
+@pytest.mark.parametrize(
+    ("iou", "yaw_rad", "has_points", "is_sure"),
+    [
+        (0.9, 0.0, False, True),
+        (0.8, 0.0, False, False),
+        (0.9, 1.3, False, False),
+        (0.9, 3.0, False, True),
+        (0.8, 0.0, True, True),
+    ],
+)
+def test_a_change_of_the_distance_counts_if_the_outline_fits_as_usual(
+    iou: float, yaw_rad: float, has_points: bool, is_sure: bool
+) -> None:
+    """Outlines show somebody at 2 m who is then 1 m farther away, and comes back."""
+    points = replace(points_at(2.0), spatial_m=None) if has_points else None
+    watch, seen = PlaceWatch(TALL, CAMERA), iter(frames(points, count=12))
+    for distance_m, overlap, turned_rad, is_tracked, off_m in (
+        *[(2.0, 0.9, 0.0, True, 0.1)] * 10,
+        (3.0, iou, yaw_rad, is_sure, 0.15 if is_sure else 1.0),
+        (2.0, 0.9, 0.0, True, 0.1),
+    ):
+        found = replace(estimate_at(distance_m, TALL), iou=overlap)
+        assert found.posture is not None
+        found.posture[YAW] = turned_rad
+        place = watch.see(found, TALL, next(seen))
+        assert place is not None
+        assert (place.state is KeypointState.TRACKED) == is_tracked
+        assert place.stddev_m[0] == pytest.approx(off_m, abs=0.02)
