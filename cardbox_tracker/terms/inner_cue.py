@@ -54,6 +54,8 @@ _FIRST = 1.0
 _MOST = 3.0
 # Share of a hand's weight that is lost beside bare forearms.
 _LOST = 0.5
+# Change of the chance that is worth new ratios.
+_STEP = 0.01
 
 
 class Sleeves:
@@ -78,7 +80,7 @@ class Sleeves:
         self._histograms, self._forearm_m, self._px_per_m = histograms.copy(), forearm_m, px_per_m
         forearm_px = forearm_m[0] * forearm_m[1] * px_per_m**2
         self._weights = np.array([0.0, _WEIGHT / forearm_px])
-        self.log_odds = _FIRST
+        self.log_odds, self._told = _FIRST, 0.0
 
     @property
     def bare(self) -> float:
@@ -93,13 +95,14 @@ class Sleeves:
     @property
     def histograms(self) -> FloatArray:
         """Probability of each bin for each part, (5, bins), with forearms as they probably are."""
+        self._told = self.bare
         histograms = self._histograms.copy()
         skin, shirt = histograms[HAND], histograms[TORSO]
-        histograms[FOREARM] = self.bare * skin + (1.0 - self.bare) * shirt
+        histograms[FOREARM] = self._told * skin + (1.0 - self._told) * shirt
         return histograms
 
-    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> None:
-        """Learn from one image.
+    def see(self, skin: NDArray[np.float32], corner: tuple[int, int], posed: Posed) -> bool:
+        """Learn from one image; return whether ``histograms`` have changed.
 
         ``skin`` (h, w) has log-likelihood ratios of the hand against the part behind, nats, and
         begins at the column and row ``corner``; 0 where both are alike. The person has one state.
@@ -111,6 +114,7 @@ class Sleeves:
             points, hidden = arms_in_image(posed, arm)
             self.log_odds += float(gains(points, hidden)[0])
         self.log_odds = float(np.clip(self.log_odds, -_MOST, _MOST))
+        return abs(self.bare - self._told) > _STEP
 
 
 def arms_in_image(posed: Posed, arm: int) -> tuple[FloatArray, NDArray[np.bool_]]:
@@ -225,8 +229,7 @@ class InnerCueTerm:
         self._follow_light(image, frame.silhouette, zones)
         u0, v0, width, height = cv2.boundingRect(frame.silhouette)
         maps = self._maps(image, frame.silhouette, zones, (u0, v0, width, height))
-        if self._sleeves is not None:
-            self._sleeves.see(maps[0], (u0, v0), before)
+        if self._sleeves is not None and self._sleeves.see(maps[0], (u0, v0), before):
             self._use(self._sleeves)
         return InnerCueObservation(
             ArmGains(maps, (u0, v0), self._weights, self._px_per_m, self._forearm_m)

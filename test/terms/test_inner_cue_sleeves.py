@@ -65,7 +65,7 @@ def test_the_chance_is_never_certain(nats: float) -> None:
 def test_colours_that_look_alike_are_no_evidence() -> None:
     worn = sleeves()
     before = worn.histograms
-    worn.see(everywhere(0.0), (0, 0), posed(np.zeros(12)))
+    assert not worn.see(everywhere(0.0), (0, 0), posed(np.zeros(12)))
     np.testing.assert_array_equal(worn.histograms, before)
 
 
