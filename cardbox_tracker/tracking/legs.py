@@ -69,8 +69,8 @@ _KNEES = [LEG_NAMES.index(f"{side}_knee_flexion") for side in ("left", "right")]
 _HIPS = [POINT_INDEX[f"{side}_hip"] for side in ("left", "right")]
 _SHOULDERS = [POINT_INDEX[f"{side}_shoulder"] for side in ("left", "right")]
 
-# Height of the ankle, and lengths of thigh and shank. Detectors mark knees and ankles there, but
-# the hip below the joint, where the thigh begins.
+# Height of the ankle, and lengths of thigh and shank between the joint of the hip and the marks of
+# knee and ankle. Detectors mark the hip, too, but below its joint.
 _ANKLE_SHARE = float(MARKED_HEIGHTS[5])
 _BONES = np.array([THIGH_SHARE, MARKED_HEIGHTS[4] - _ANKLE_SHARE])
 # Width of the image's border, as a share of its longer side, where the detector guesses points.
