@@ -358,21 +358,19 @@ def _lags(one: Seen, other: Seen, step_s: float) -> tuple[FloatArray, FloatArray
 
 
 class _Offset(NamedTuple):
-    """The likeliest offset of a film, s, within which time it is, s, and who is who.
-
-    Also whether it is given, or surely none of chance.
-    """
+    """The likeliest offset of a film."""
 
     offset_s: float
-    within_s: float
+    within_s: float  #: how far off it may be
     who: Who
-    is_clear: bool
+    is_clear: bool  #: whether it is given, or surely none of chance
 
 
 def _offset(first: Film, film: Film) -> _Offset | None:
     """Return the likeliest offset of a film; None if speeds agree nowhere.
 
-    Speeds of people whom one camera sees from behind and above agree best up to 0.1 s beside it.
+    Speeds of people whom one camera sees from behind and above agree best up to 0.1 s beside the
+    true one.
     """
     periods_s = [one.period_s for one in (*first.people, *film.people)]
     step_s = max(periods_s, default=1.0) / 2.0

@@ -122,10 +122,9 @@ def fit_neck(
     )
 
     found = Solution(_solve(given), ["face"])
-    best = int(np.argmin(found.total))
-    values, information = found.values[best], found.information[best]
+    values, information = found.values[0], found.information[0]
     # Priors add as many residuals as there are unknowns, so the points are the degrees of freedom.
-    rms = float(np.sqrt(found.total[best] / (2 * np.count_nonzero(known))))
+    rms = float(np.sqrt(found.total[0] / (2 * np.count_nonzero(known))))
     angles = values[:_N]
     beyond = np.maximum(NECK_LIMITS[:, 0] - angles, angles - NECK_LIMITS[:, 1])
     stddev = np.sqrt(np.diag(np.linalg.inv(information))[:_N]) * max(1.0, rms)
@@ -171,7 +170,7 @@ def _write_residuals(values: Floats, given: _Given, residuals: Floats) -> None:
 
 @kernel
 def _solve(given: _Given) -> Equations:
-    """Return the equations of the best values from each start."""
+    """Return the equations of the best values, from a head that looks ahead."""
     rows = given, 2 * given[3].shape[0], DIFFERENCE
     return minimize_compiled(_write_residuals, rows, np.zeros((1, 6)), _RULES, ENDS)
 
