@@ -26,7 +26,7 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import cos, erfc, hypot, log, sqrt, tan
+from math import cos, erfc, hypot, log, radians, sqrt, tan
 
 import numpy as np
 
@@ -56,7 +56,7 @@ _COMPARED_S, _POINTS_STDDEV = 1.5, 0.045
 
 # Outlines fit as usual from this share of a quantile of the latest overlaps on; least cosine of the
 # yaw of who is not seen from aside.
-_FITS, _USUAL, _LATEST, _ACROSS = 0.96, 0.8, 150, sqrt(0.5)
+_FITS, _USUAL, _LATEST, _ACROSS = 0.96, 0.8, 150, cos(radians(20.0))
 
 _TRUNK, _ARM = ("shoulder", "hip"), ("shoulder", "elbow", "wrist")
 # Lengths between a detector's points as shares of the length of an arm up to the knuckles, whose

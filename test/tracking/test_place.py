@@ -254,6 +254,7 @@ def test_without_a_second_source_nothing_contradicts() -> None:
     [
         (0.9, 0.0, False, True),
         (0.8, 0.0, False, False),
+        (0.9, 0.6, False, False),
         (0.9, 1.3, False, False),
         (0.9, 3.0, False, True),
         (0.8, 0.0, True, True),
