@@ -410,7 +410,7 @@ def test_the_depth_of_a_second_camera_counts(roll_rad: float) -> None:
     for factor in (1.0, 1.08):
         raw_m = raw_of(factor * depth_m, view, other.camera, 0.0)
         tracker = Tracker(BODY, CAMERA, config, others=[other])
-        for _ in range(12):
+        for _ in range(30):
             estimate = tracker.track([None, Observation(mask, depth_m=raw_m)])
         assert estimate.keypoints_m is not None
         pose_of = other.extrinsics
