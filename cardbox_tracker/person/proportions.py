@@ -32,6 +32,13 @@ of the stature."""
 MARKED_HEIGHTS: FloatArray = np.array([0.915, 0.932, 0.811, 0.507, 0.283, 0.063])
 """Heights above the floor at which MediaPipe marks nose, ears, shoulders, hips, knees and ankles of
 people who stand upright."""
+MASS_SHARES = 0.4244, 0.3670, 0.1393, 0.0693
+"""Shares of the middles of shoulders, hips, knees and ankles in that of the mass.
+
+Trunk with head and arms, thighs, shanks and feet have 0.678, 0.2, 0.093 and 0.029 of it; the
+centres are at 0.626, 0.433 and 0.433 of the way from the hips to the shoulders, from the hips to
+the knees, and from these to the ankles (Winter, table 4.1).
+"""
 _CROWN_SHARE = 0.83 / STATURE_M
 _SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
 

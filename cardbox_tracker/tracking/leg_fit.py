@@ -20,6 +20,7 @@ from cardbox_tracker.common.least_squares import (
     minimize_compiled,
     rules_of,
 )
+from cardbox_tracker.person.proportions import MASS_SHARES
 from cardbox_tracker.person.skeleton import LEG_LIMITS
 from cardbox_tracker.terms.kernel_arguments import Floats
 
@@ -33,10 +34,9 @@ _OF_LEG = 7
 _N_RESIDUALS = 2 * _OF_LEG + 2 * N_ANGLES + 4 + 1
 # Deviation of a foot on the floor, m, and height above it from which a foot is lifted rather.
 _CONTACT_M, _LIFTED_M = 0.02, 0.06
-# Shares of the mass: trunk, head and arms; thighs; shanks; feet; and how far along thigh and shank
-# the centres are (D. Winter, Biomechanics and Motor Control of Human Movement, table 4.1). Then how
-# far the middle of the mass of somebody who stands is ahead of the ankles, m.
-_UPPER, _THIGHS, _SHANKS, _FEET, _ALONG, _AHEAD_M = 0.678, 0.2, 0.093, 0.029, 0.433, 0.05
+# How far the middle of the mass of somebody who stands is ahead of the ankles, m.
+_AHEAD_M = 0.05
+_OF_SHOULDERS, _OF_HIPS, _OF_KNEES, _OF_ANKLES = MASS_SHARES
 # Lowest and highest values; the lengths of people are within 12 %, floor and distance are free.
 _LOWEST = np.array([*LEG_LIMITS[:, 0], -0.12, -0.12, -inf, -inf])
 _HIGHEST = np.array([*LEG_LIMITS[:, 1], 0.12, 0.12, inf, inf])
@@ -53,7 +53,7 @@ lower root (4, 4) of its information."""
 Shown = tuple[Floats, Floats, Floats, Floats, tuple[float, float]]
 """Knees and ankles in the image (2, 2, 2), their deviations (2, 2), px, inf for unknown ones;
 slopes of thighs and shanks (2, 2), nan for unknown ones, and their deviations (2, 2); how much
-nearer to the camera than the hips the mass of trunk, head and arms is, m, and the deviation of the
+nearer to the camera than the hips the shoulders are, m, and the deviation of the
 middle of the whole mass from that of somebody who stands, m, inf for who does not."""
 Given = tuple[Person, View, Prior, Shown]
 
@@ -92,29 +92,29 @@ def points_of(values: Floats, of: Person) -> Floats:
 
 
 @kernel
-def _middle_m(hip: float, knee: float, ankle: float, upper_m: float) -> float:
+def _middle_m(hip: float, knee: float, ankle: float, trunk_m: float) -> float:
     """Return how far the middle of the mass is ahead of an ankle, m, by coordinates along a line.
 
-    ``upper_m`` is how far that of trunk, head and arms is ahead of the hip.
+    ``trunk_m`` is how far the shoulders are ahead of the hip.
     """
-    middle_m = _UPPER * (hip + upper_m) + _THIGHS * (hip + _ALONG * (knee - hip))
-    return middle_m + _SHANKS * (knee + _ALONG * (ankle - knee)) + (_FEET - 1.0) * ankle
+    middle_m = _OF_SHOULDERS * (hip + trunk_m) + _OF_HIPS * hip + _OF_KNEES * knee
+    return middle_m + (_OF_ANKLES - 1.0) * ankle
 
 
 def balanced_m(points_m: Floats, facing: Floats) -> float:
-    """Return how far the mass of trunk, head and arms of who stands is ahead of the hips, m.
+    """Return how far the shoulders of who stands are ahead of the hips, m.
 
     ``points_m`` (6, 3) are hips, knees and ankles, and ``facing`` (3,) is where the person faces.
     """
     hip, knee, ankle = (np.mean(points_m.reshape(2, 3, 3), axis=0) @ facing).tolist()
-    return (_AHEAD_M - _middle_m(hip, knee, ankle, 0.0)) / _UPPER
+    return (_AHEAD_M - _middle_m(hip, knee, ankle, 0.0)) / _OF_SHOULDERS
 
 
 @borrowing_kernel
 def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: Floats) -> float:
     """Write the residuals (35,) of values (12,), and return the sum of their squares."""
     of, (axes, (fx, fy, cx, cy)), (before, change, expected, root), shown = given
-    px, sigma_px, slopes, sigma_slopes, (upper_m, sigma_m) = shown
+    px, sigma_px, slopes, sigma_slopes, (trunk_m, sigma_m) = shown
     _place(values, of, points_m)
     for leg in range(2):
         at = _OF_LEG * leg
@@ -149,7 +149,7 @@ def _write_residuals(values: Floats, given: Given, points_m: Floats, residuals: 
     middle_m = 0.0
     for leg in range(2):
         hip, knee, ankle = points_m[3 * leg, 0], points_m[3 * leg + 1, 0], points_m[3 * leg + 2, 0]
-        middle_m += _middle_m(hip, knee, ankle, upper_m)
+        middle_m += _middle_m(hip, knee, ankle, trunk_m)
     residuals[at + 4] = (middle_m / 2 - _AHEAD_M * of[2][0, 0]) / sigma_m
     total = 0.0
     for i in range(_N_RESIDUALS):

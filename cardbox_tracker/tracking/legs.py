@@ -88,9 +88,8 @@ _LENGTH, _FLOOR_M = 0.04, 0.12
 # Relative deviation of the tracker's distance of the hips, in all images and in each.
 _DISTANCE_SHARE = 0.03
 _FIXED = 1e-6
-# Deviation of the middle of the mass of somebody who stands, m, and where that of trunk, head and
-# arms is on the way from the hips to the shoulders (see :mod:`.leg_fit`).
-_BALANCE_M, _UPPER_SHARE = 0.03, 0.626
+# Deviation of the middle of the mass of somebody who stands, m.
+_BALANCE_M = 0.03
 # Somebody stands who bends the knees by less, rad. Who bends them more, and has not moved the hips
 # by this distance, m, for this time, s, sits. A foot that is higher than the other one by this
 # distance is not on the floor.
@@ -307,7 +306,7 @@ class _Fit:
         before, _, shared, _ = prior
         others, shown, count = np.empty((0, N_VALUES)), _NOTHING, 1
         if seen is not None:
-            balance = float(_UPPER_SHARE * self._trunk_m[0]), _BALANCE_M if stands else np.inf
+            balance = float(self._trunk_m[0]), _BALANCE_M if stands else np.inf
             others, shown, count = self._folded(seen, shared), (*seen[:4], balance), 4 + 8
         first = np.concatenate([before, shared])
         found, gained, least = leg_fit.fit(first, others, (self.person, self._view, prior, shown))
@@ -315,8 +314,8 @@ class _Fit:
 
     def balanced_rad(self, points_m: FloatArray) -> float:
         """Return how far a trunk leans whose mass is balanced over legs (6, 3), rad."""
-        upper_m = _UPPER_SHARE * np.linalg.norm(self._trunk_m)
-        share = leg_fit.balanced_m(points_m, self._turn[:, 0]) / upper_m
+        ahead_m = leg_fit.balanced_m(points_m, self._turn[:, 0])
+        share = ahead_m / np.linalg.norm(self._trunk_m)
         return float(np.arcsin(np.clip(share, 0.0, 1.0)))
 
     def _folded(self, seen: _Seen, shared: FloatArray) -> FloatArray:

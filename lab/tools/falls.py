@@ -3,9 +3,8 @@
     python -m lab.tools.falls TABLE... [--person K]
 
 A table is one of ``cardbox track`` with legs. The middle of the mass has to be between 6 cm behind
-and 21 cm ahead of the ankles, where heels and toes are (masses of D. Winter, see
-:mod:`cardbox_tracker.tracking.leg_fit`). Images with the hips below 70 % of their usual height are
-squats; of these, shoulders and hips are given as cm ahead of the ankles.
+and 21 cm ahead of the ankles, where heels and toes are. Images with the hips below 70 % of their
+usual height are squats; of these, shoulders and hips are given as cm ahead of the ankles.
 """
 
 from __future__ import annotations
@@ -17,6 +16,7 @@ import numpy as np
 
 from cardbox_tracker import Result, read_result
 from cardbox_tracker.camera.camera import level_to_optical
+from cardbox_tracker.person.proportions import MASS_SHARES
 from cardbox_tracker.person.sizes import FloatArray
 
 _BEHIND_M, _AHEAD_M, _SQUAT = -0.06, 0.21, 0.7
@@ -38,9 +38,7 @@ def ahead_of_ankles(result: Result) -> tuple[FloatArray, FloatArray]:
         return np.asarray(np.mean(sides, axis=0) @ to_level)
 
     shoulders, hips, knees, ankles = map(middle, ("shoulder", "hip", "knee", "ankle"))
-    upper, thighs = hips + 0.626 * (shoulders - hips), hips + 0.433 * (knees - hips)
-    shanks = knees + 0.433 * (ankles - knees)
-    mass = 0.678 * upper + 0.2 * thighs + 0.093 * shanks + 0.029 * ankles
+    mass = np.tensordot(MASS_SHARES, [shoulders, hips, knees, ankles], axes=1)
     yaw = result.numbers["torso_yaw"]
     facing = np.stack([np.cos(yaw), np.sin(yaw), np.zeros(len(yaw))], axis=1)
     ahead = [((point - ankles) * facing).sum(axis=1) for point in (mass, shoulders, hips)]

@@ -58,6 +58,7 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.settings import setting
 from cardbox_tracker.person.legs import LEG_KEYPOINT_NAMES, leg_directions
 from cardbox_tracker.person.posture import PITCH
+from cardbox_tracker.person.proportions import MASS_SHARES
 from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import LEG_NAMES, STATE_NAMES, KeypointState
 from cardbox_tracker.recordings.result_reader import Results
@@ -177,11 +178,8 @@ REBA = Method(
 
 # Height above the other foot from which a foot carries no weight, m.
 _LIFTED_M = 0.10
-# Masses of head, arms and trunk, of both thighs, and of both shanks with the feet, and how far from
-# hips to shoulders, hips to knees, and knees to ankles their centres are (Winter, "Biomechanics and
-# Motor Control of Human Movement"); heel behind the ankle, m, and margin of the centre of mass, m:
-# two deviations where hips, knees and trunk are wrong by 9 degrees.
-_MASSES, _CENTRES = (0.678, 0.2, 0.122), (0.626, 0.433, 0.606)
+# Heel behind the ankle, m, and margin of the middle of the mass, m: two deviations where hips,
+# knees and trunk are wrong by 9 degrees.
 _HEEL_M, _MARGIN_M = 0.05, 0.17
 # Slope up to which thighs are level, rad; time after which somebody like that sits, ns.
 _LEVEL_RAD, _SITS_NS = math.radians(30.0), 1_000_000_000
@@ -371,14 +369,9 @@ def sits(angles: FloatArray, pitch: FloatArray, lengths_m: FloatArray) -> ScoreA
         lengths_m: see :class:`Seen`.
     """
     knee_m, ankle_m = _limbs_m(angles, lengths_m)
-    ahead_m = (
-        float(lengths_m[0]) * np.sin(pitch),
-        knee_m[..., 0].mean(axis=0),
-        (knee_m[..., 0] + _CENTRES[2] * (ankle_m - knee_m)[..., 0]).mean(axis=0),
-    )
-    shares = _CENTRES[0], _CENTRES[1], 1.0
-    parts = zip(_MASSES, shares, ahead_m, strict=True)
-    centre_m = sum(mass * share * at_m for mass, share, at_m in parts)
+    of_shoulders, _, of_knees, of_ankles = MASS_SHARES
+    legs_m = of_knees * knee_m[..., 0] + of_ankles * ankle_m[..., 0]
+    centre_m = of_shoulders * lengths_m[0] * np.sin(pitch) + legs_m.mean(axis=0)
     heels_m = ankle_m[..., 0].min(axis=0) - _HEEL_M
     slopes_rad = np.abs(np.arcsin(knee_m[..., 2] / np.linalg.norm(knee_m, axis=-1)))
     is_level = (slopes_rad < _LEVEL_RAD).all(axis=0)
