@@ -6,11 +6,9 @@ away for longer is known by the colours of the trunk alone.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import cv2
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from cardbox_tracker.common.health import Verdict
 from cardbox_tracker.detectors.figure import Figure
@@ -98,24 +96,16 @@ def unlike(
     return (other / _COLOURS) ** 2 + (moved / deviation) ** 2
 
 
-def cheapest(costs: Sequence[Sequence[float]]) -> dict[int, int]:
+def cheapest(costs: ArrayLike) -> dict[int, int]:
     """Return the column of each row of ``costs`` (N, M) below ``OTHER``, with the least sum.
 
-    A row without a column counts ``OTHER``. The time grows with 2 to the smaller of N and M.
+    A row without a column counts ``OTHER``.
     """
-    if len(costs) and len(costs) > len(costs[0]):
-        # Many short tracks of a film stand beside the few people of an image.
-        turned = cheapest(list(zip(*costs, strict=True)))
-        return {row: column for column, row in turned.items()}
-    best: dict[int, tuple[float, dict[int, int]]] = {0: (0.0, {})}
-    for column, of_rows in enumerate(zip(*costs, strict=True)):
-        for taken, (total, pairs) in list(best.items()):
-            for row, cost in enumerate(of_rows):
-                key, now = taken | 1 << row, total + cost - OTHER
-                is_free = cost < OTHER and not taken >> row & 1
-                if is_free and (key not in best or now < best[key][0]):
-                    best[key] = now, {**pairs, row: column}
-    return min(best.values(), key=lambda one: one[0])[1]
+    from scipy.optimize import linear_sum_assignment
+
+    table = np.atleast_2d(np.minimum(costs, OTHER))
+    pairs = zip(*linear_sum_assignment(table), strict=True)
+    return {int(row): int(column) for row, column in pairs if table[row, column] < OTHER}
 
 
 class Identity:

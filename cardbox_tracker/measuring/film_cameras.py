@@ -389,7 +389,7 @@ def _offset(first: Film, film: Film) -> _Offset | None:
         gains = np.zeros((len(first.people), len(film.people)))
         for pair, (lags, sure) in curves.items():
             gains[pair] = max(0.0, np.interp(offset_s, lags, sure, 0.0, 0.0))
-        pairs = sorted(cheapest((OTHER - gains).tolist()).items(), key=lambda at: -gains[at])
+        pairs = sorted(cheapest(OTHER - gains).items(), key=lambda at: -gains[at])
         # Chance gives each of them its own.
         together = np.cumsum([gains[at] for at in pairs]) / np.sqrt(np.arange(1, len(pairs) + 1))
         if together.max(initial=0.0) > best:
