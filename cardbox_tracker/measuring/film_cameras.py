@@ -44,7 +44,13 @@ from cardbox_tracker.detectors.image_points import (
     LegPoints,
 )
 from cardbox_tracker.measuring.people_camera import Sightings, is_inside
-from cardbox_tracker.person.proportions import MARKED_HEIGHTS, USUAL_STATURE_M
+from cardbox_tracker.person.proportions import (
+    HIP_SHARE,
+    LENGTH_SHARES,
+    MARKED_HEIGHTS,
+    USUAL_STATURE_M,
+    WRIST_SHARE,
+)
 from cardbox_tracker.person.sizes import FloatArray
 
 BoolArray = NDArray[np.bool_]
@@ -63,13 +69,16 @@ _SHOULDER, _HIP, _KNEE, _ANKLE = MARKED_HEIGHTS[2:].tolist()
 # Lengths between points as shares of the stature, with relative deviations among people: limbs of
 # either side, then breadths.
 _LIMBS = {
-    ("shoulder", "elbow"): (0.160, 0.06),
-    ("elbow", "wrist"): (0.146, 0.06),
+    ("shoulder", "elbow"): (LENGTH_SHARES["upper_arm_length"], 0.06),
+    ("elbow", "wrist"): (WRIST_SHARE * LENGTH_SHARES["forearm_length"], 0.06),
     ("shoulder", "hip"): (_SHOULDER - _HIP, 0.06),
     ("hip", "knee"): (_HIP - _KNEE, 0.06),
     ("knee", "ankle"): (_KNEE - _ANKLE, 0.06),
 }
-_BREADTHS = {"shoulder": (0.197, 0.10), "hip": (0.12, 0.15)}
+_BREADTHS = {
+    "shoulder": (LENGTH_SHARES["shoulder_breadth"], 0.10),
+    "hip": (2.0 * HIP_SHARE, 0.15),
+}
 _PRIORS = np.array([*_LIMBS.values(), *_BREADTHS.values()])
 # Speeds are of points smoothed over this time, s, and count to this many deviations.
 _SMOOTH_S, _MOST_SPEED = 0.07, 3.0

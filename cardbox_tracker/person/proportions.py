@@ -40,7 +40,8 @@ centres are at 0.626, 0.433 and 0.433 of the way from the hips to the shoulders,
 the knees, and from these to the ankles (Winter, table 4.1).
 """
 _CROWN_SHARE = 0.83 / STATURE_M
-_SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
+LENGTH_SHARES = {"upper_arm_length": 0.160, "forearm_length": 0.2005, "shoulder_breadth": 0.197}
+"""Upper arm, forearm to the knuckles, and distance of the shoulder joints."""
 
 STATURE_LIMITS_M = (1.1, 2.2)
 """Range of the stature, metres: a child of six to a very tall adult."""
@@ -60,7 +61,7 @@ BREADTHS: tuple[str, ...] = (
 def sizes_of_stature(stature_m: float) -> FloatArray:
     """Return the mean sizes (18,) of people of a stature, metres."""
     sizes: FloatArray = DEFAULT_SIZES * stature_m / STATURE_M
-    for name, share in _SHARES.items():
+    for name, share in LENGTH_SHARES.items():
         sizes[SIZE_INDEX[name]] = share * stature_m
     return sizes
 
