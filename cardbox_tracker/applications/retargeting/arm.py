@@ -287,8 +287,8 @@ def _turned_deg(robot: Robot) -> float:
         places = [Kinematics(one).at(np.zeros(len(one.joints))) for one in (left, right)]
     except CardboxError:
         return 0.0
-    x, y, z = places[0].origins_m[1] - places[1].origins_m[1]
-    return 90.0 * round(math.atan2(x, y) / (np.pi / 2)) if math.hypot(x, y) > abs(z) else 0.0
+    x, y, _ = places[0].origins_m[1] - places[1].origins_m[1]
+    return 90.0 * round(math.atan2(x, y) / (np.pi / 2))
 
 
 class ArmFollower:
