@@ -129,6 +129,53 @@ def test_the_first_camera_info_with_a_calibration_counts(tmp_path: Path, empty: 
         assert any(f"first {empty} messages on /camera_info" in text for text in bag.remarks)
 
 
+@pytest.mark.parametrize("size", [(0, 0), (160, 120)])
+def test_a_camera_info_without_a_calibration_is_no_zoom(
+    tmp_path: Path, size: tuple[int, int]
+) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    empty = info(store, *size, K if size == (0, 0) else (0.0,) * 9)
+    infos = [info(store)] * 4 + [empty] * 4
+    with open_images(recorded(tmp_path / "bag", infos=infos)) as bag:
+        assert bag.calibration().k[0, 0] == 165.0
+        assert bag.remarks == []
+
+
+@pytest.mark.parametrize(
+    ("region", "fault"),
+    [
+        ((40, 30, 80, 60), "has 80x60 px, but the images of /image_raw have 160x120"),
+        ((100, 80, 80, 60), "80x60 px at (100, 80), outside of images of 160x120"),
+    ],
+)
+def test_a_region_that_is_not_that_of_the_images_is_refused(
+    tmp_path: Path, region: tuple[int, int, int, int], fault: str
+) -> None:
+    wrong = info(get_typestore(Stores.ROS2_JAZZY))
+    wrong.roi.x_offset, wrong.roi.y_offset, wrong.roi.width, wrong.roi.height = region
+    with (
+        open_images(recorded(tmp_path / "bag", infos=[wrong])) as bag,
+        pytest.raises(CameraError, match=re.escape(fault)),
+    ):
+        bag.calibration()
+
+
+@pytest.mark.parametrize("name", ["image_rect", "image_rect_color", "rect/image"])
+def test_images_that_are_rectified_by_their_name_have_p_and_no_distortion(
+    tmp_path: Path, name: str
+) -> None:
+    """The CameraInfo beside those of image_proc is that of the raw images."""
+    of_raw = info(get_typestore(Stores.ROS2_JAZZY))
+    of_raw.d[0] = -0.3
+    of_raw.p[[0, 2, 5, 6]] = 140.0, 119.5, 140.0, 59.5
+    with open_images(recorded(tmp_path / "bag", (f"/{name}",), [of_raw])) as bag:
+        found = bag.calibration()
+        assert (found.k[0, 0], found.k[0, 2], found.is_distorted) == (140.0, 119.5, False)
+        told = " ".join(bag.remarks)
+        assert "so P of /camera_info is used" in told
+        assert "principal point (119.5, 59.5) px is far from the middle" in told
+
+
 def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: Path) -> None:
     nameless = info(get_typestore(Stores.ROS2_JAZZY))
     nameless.header.frame_id = ""
