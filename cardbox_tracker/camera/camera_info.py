@@ -142,8 +142,8 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
             raise CameraError(
                 f"the region of interest in {info_topic} is {roi.width}x{roi.height} px at "
                 f"({roi.x_offset}, {roi.y_offset}), outside of images of {width}x{height}; "
-                f"expected the part of them that {image_topic} has: correct the camera's driver, or "
-                "give --fov DEG or --calibration FILE"
+                f"expected the part of them that {image_topic} has: correct the camera's driver, "
+                "or give --fov DEG or --calibration FILE"
             )
         k[0, 2] -= roi.x_offset
         k[1, 2] -= roi.y_offset
