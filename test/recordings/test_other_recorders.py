@@ -15,6 +15,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
+from cardbox_tracker.recordings.bag_files import lone_parts
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -358,6 +359,14 @@ def test_files_of_other_names_are_recordings_of_their_own(
         BagReader(folder).__enter__()
 
 
+def test_parts_of_which_one_is_missing_are_named() -> None:
+    def found(*numbers: int) -> list[str]:
+        return lone_parts([Path("all", f"take_{number}.mcap") for number in numbers])
+
+    assert found(0, 2) == ["take_0.mcap", "take_2.mcap"]
+    assert found(1, 2) == found(0) == lone_parts([Path("a_0.mcap"), Path("b_2.mcap")]) == []
+
+
 def test_parts_that_are_apart_are_refused(tmp_path: Path) -> None:
     folder = tmp_path / "session"
     folder.mkdir()
@@ -368,7 +377,7 @@ def test_parts_that_are_apart_are_refused(tmp_path: Path) -> None:
         BagReader(folder).__enter__()
 
 
-@pytest.mark.parametrize("empty", ['""', "''", ""])
+@pytest.mark.parametrize("empty", ['""', "''", "", "null", "other"])
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_metadata_without_a_storage_are_those_of_the_files(
     tmp_path: Path, storage: str, empty: str
