@@ -233,6 +233,7 @@ class GivenPoints:
             # A video's images have no names, but programs number those that they take out of it.
             numbers = image_numbers(key for key in persons if isinstance(key, str))
             self._numbered = {number: persons[name] for name, number in numbers.items()}
+        self._is_by_number = False
         self.restart()
 
     def restart(self) -> None:
@@ -253,6 +254,7 @@ class GivenPoints:
         """Return the people in an image; none if no points join it."""
         if self.kind == COLUMNS[0]:
             return self._persons.get(self._nearest(image.stamp_ns, tolerance_ns), [])
+        self._is_by_number = self.kind == FRAME or (self.kind == "name" and not image.name)
         if self.kind == "name" and not image.name:
             return self._numbered.get(image.number, [])
         return self._persons.get(image.key(self.kind), [])
@@ -334,6 +336,11 @@ class GivenPoints:
             found.append(
                 f"the points of {self._lying} of {self.used} images are of people who lie; if they "
                 "do not, columns and rows are exchanged: expected u, v"
+            )
+        if self._is_by_number and min(self._numbered or self._stamps, default=0) == 1:
+            found.append(
+                f"the images of {self._path} are numbered from 1 on; expected 0 for the first one: "
+                "if 1 is the first one, all points are an image late, so subtract 1"
             )
         if self._most_score > _ROUNDED:
             found.append(

@@ -582,3 +582,13 @@ def test_a_folder_without_files_of_openpose_is_refused(tmp_path: Path) -> None:
     (tmp_path / "points.json").rename(tmp_path / "points_1.json")
     with pytest.raises(CardboxError, match="has no list 'people'"):
         PointTable(tmp_path).read(None)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_numbers_of_images_that_begin_with_1_are_told(tmp_path: Path, first: int) -> None:
+    """Programs that take images out of a video often count them from 1."""
+    for number in range(first, 5):
+        openpose(tmp_path / "points", number, [10.0, 20.0, 0.9] * 17)
+    found = read(PointTable(tmp_path / "points"))
+    found.all_in(Image(0, 0))
+    assert ("numbered from 1 on" in found.remark) == (first == 1)
