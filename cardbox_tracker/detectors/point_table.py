@@ -22,7 +22,12 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
     LegPoints,
 )
-from cardbox_tracker.detectors.keypoint_json import coco_people, image_numbers, openpose_people
+from cardbox_tracker.detectors.keypoint_json import (
+    coco_people,
+    image_numbers,
+    openpose_people,
+    plain_name,
+)
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
 from cardbox_tracker.detectors.point_checks import (
     Size,
@@ -110,7 +115,7 @@ class PointTable(NamedTuple):
         return GivenPoints(path, "name" if is_named else FRAME, persons, most_score=most)
 
     def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons, float]:
-        most = 0.0
+        most, names = 0.0, dict[str, None]()
         found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
         counts = Counter[str]()
@@ -122,7 +127,8 @@ class PointTable(NamedTuple):
                 for row in rows:
                     if camera is not None and row["camera"] != camera:
                         continue
-                    image, joint = _image_of(row[column], column), row["joint"]
+                    image, joint = _image_of(row[column], column), plain_name(row["joint"] or "")
+                    names.setdefault(joint)
                     # A cell that is empty is missing, as in tables of pandas.
                     u, v, score = (
                         float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:]
@@ -152,6 +158,11 @@ class PointTable(NamedTuple):
             ) from None
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
+        if names and not _USED & names.keys():
+            raise CardboxError(
+                f"{self.path} names its points {quoted(', '.join(names))}; expected names such as "
+                "left_shoulder in the column joint"
+            )
         persons: Persons = {}
         for key, joints in found.items():
             try:
