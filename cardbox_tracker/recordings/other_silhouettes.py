@@ -111,8 +111,8 @@ class DepthSilhouetteSource(SilhouetteSource):
         if 2 * self._mostly_near > self._with_depth:
             found.append(
                 f"most of {topic} is nearer than --within {self._within.metres:g} m in "
-                f"{self._mostly_near} images: choose it between the person and the wall, and correct "
-                "the unit if 16UC1 is not in millimetres or 32FC1 not in metres"
+                f"{self._mostly_near} images: choose it between the person and the wall, and "
+                "correct the unit if 16UC1 is not in millimetres or 32FC1 not in metres"
             )
         if self._is_near:
             return found
