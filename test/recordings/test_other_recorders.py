@@ -177,6 +177,20 @@ def test_images_that_are_rectified_by_their_name_have_p_and_no_distortion(
         assert "principal point (119.5, 59.5) px is far from the middle" in told
 
 
+def test_further_images_in_the_namespace_of_a_camera_are_left_out(tmp_path: Path) -> None:
+    """The root namespace has no name by which a user could choose it."""
+    topics = "/image_raw", "/image_rect"
+    with open_images(recorded(tmp_path / "bag", topics)) as bag:
+        assert bag.image_topic() == "/image_raw"
+        assert bag.left_out("/image_raw") == ["the images on /image_rect"]
+    topics = "/left/image_raw", "/right/image_raw"
+    with (
+        open_images(recorded(tmp_path / "two", topics)) as bag,
+        pytest.raises(BagError, match="2 image topics"),
+    ):
+        bag.image_topic()
+
+
 def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: Path) -> None:
     nameless = info(get_typestore(Stores.ROS2_JAZZY))
     nameless.header.frame_id = ""
