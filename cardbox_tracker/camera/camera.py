@@ -183,7 +183,7 @@ class Calibration:
     told_by: str = ""  #: what tells the focal lengths, in words; empty if that is not known
     #: how many views of the camera fill an image; working images have so many times more pixels.
     views: float = 1.0
-    is_region: bool = False  #: whether the image is a part of what the camera could send
+    region_px: int = 0  #: width of the region of the sensor of which images are; 0 for all of it
 
     def __post_init__(self) -> None:
         """Check the types, and bring the lens and the name of the frame into their usual form."""
@@ -293,10 +293,10 @@ class Calibration:
                 f"those of {images} are {width}x{height}, another shape; calibrate the camera at "
                 "the size it delivers, or with images of the same aspect ratio and orientation"
             )
-        if self.is_region and width > self.width:
+        if 0 < self.region_px < width:
             raise CameraError(
-                f"the region of interest in {source} has {self.width}x{self.height} px, but the "
-                f"images of {images} have {width}x{height}; expected no more than the region: "
+                f"the region of interest in {source} is {self.region_px} px wide, but the images "
+                f"of {images} have {width}x{height}; expected no more than the region: "
                 "correct the camera's driver, or give --fov DEG or --calibration FILE"
             )
 

@@ -160,5 +160,5 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         message.distortion_model,
         message.header.frame_id,
         told_by="CameraInfo",
-        is_region=is_region,
+        region_px=int(roi.width) if is_region else 0,
     )

@@ -145,7 +145,7 @@ def test_a_camera_info_without_a_calibration_is_no_zoom(
 @pytest.mark.parametrize(
     ("region", "fault"),
     [
-        ((40, 30, 80, 60), "has 80x60 px, but the images of /image_raw have 160x120"),
+        ((40, 30, 80, 60), "is 80 px wide, but the images of /image_raw have 160x120"),
         ((100, 80, 80, 60), "80x60 px at (100, 80), outside of images of 160x120"),
     ],
 )
@@ -159,6 +159,12 @@ def test_a_region_that_is_not_that_of_the_images_is_refused(
         pytest.raises(CameraError, match=re.escape(fault)),
     ):
         bag.calibration()
+    # Images may be of the region before binning.
+    wrong.roi.x_offset = wrong.roi.y_offset = 0
+    wrong.width, wrong.height, wrong.roi.width, wrong.roi.height = 320, 240, 160, 120
+    wrong.binning_x = wrong.binning_y = 2
+    with open_images(recorded(tmp_path / "binned", infos=[wrong])) as bag:
+        assert (bag.calibration().width, bag.calibration().k[0, 0]) == (80, 82.5)
 
 
 @pytest.mark.parametrize("name", ["image_rect", "image_rect_color", "rect/image"])
