@@ -85,7 +85,7 @@ class CalibrationWatch:
             return False
         self.current, self._other, self._count = calibration, None, 0
         self._content = content
-        self.remark, self.doubt = "", info_remark(message, self._topic)
+        self.remark, self.doubt = "", info_remark(message, self._topic, self._image_topic)
         return True
 
     def _check(self, calibration: Calibration) -> None:

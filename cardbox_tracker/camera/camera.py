@@ -183,6 +183,7 @@ class Calibration:
     told_by: str = ""  #: what tells the focal lengths, in words; empty if that is not known
     #: how many views of the camera fill an image; working images have so many times more pixels.
     views: float = 1.0
+    region_px: int = 0  #: width of the region of the sensor of which images are; 0 for all of it
 
     def __post_init__(self) -> None:
         """Check the types, and bring the lens and the name of the frame into their usual form."""
@@ -283,13 +284,20 @@ class Calibration:
     def check_shape(self, width: int, height: int, images: str, source: str) -> None:
         """Raise CameraError unless images of ``width`` x ``height`` px have this aspect ratio.
 
-        ``images`` and ``source`` name the images and the origin of the calibration in the text.
+        Images of a region must not be larger than it, either. ``images`` and ``source`` name the
+        images and the origin of the calibration in the text.
         """
         if min(self.width, self.height) > 0 and not self.has_shape(width, height):
             raise CameraError(
                 f"the calibration of {source} is for images of {self.width}x{self.height}, but "
                 f"those of {images} are {width}x{height}, another shape; calibrate the camera at "
                 "the size it delivers, or with images of the same aspect ratio and orientation"
+            )
+        if 0 < self.region_px < width:
+            raise CameraError(
+                f"the region of interest in {source} is {self.region_px} px wide, but the images "
+                f"of {images} have {width}x{height}; expected no more than the region: "
+                "correct the camera's driver, or give --fov DEG or --calibration FILE"
             )
 
     def camera(self, width: int, height: int, pitch_rad: float = 0.0) -> Camera:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -46,13 +47,31 @@ def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
     )
 
 
-def is_rectified_only(message: Any) -> bool:
-    """Return whether a CameraInfo describes rectified images alone: K is zero, and P is not."""
-    return bool(not info_array(message, "k").any() and info_array(message, "p").any())
+# Topics of images that image_proc has rectified, whose CameraInfo is that of the raw images.
+_RECTIFIED = re.compile(r"(?:^|[/_])rect(?:[/_]|$)")
+
+
+def is_rectified(message: Any, image_topic: str) -> bool:
+    """Return whether P describes the images of a topic: by K, which is zero, or by their name."""
+    is_named = _RECTIFIED.search(image_topic) and info_array(message, "d").any()
+    return bool((is_named or not info_array(message, "k").any()) and info_array(message, "p").any())
+
+
+def _lens(message: Any, image_topic: str) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the matrix (3, 3) and the distortion (n,) of the images of a topic."""
+    if is_rectified(message, image_topic):
+        return info_array(message, "p").reshape(3, 4)[:, :3].copy(), np.zeros(5)
+    return info_array(message, "k").reshape(3, 3), info_array(message, "d")
 
 
 def is_other_lens(message: Any, first: Any) -> bool:
-    """Return whether focal length or principal point of two CameraInfo differ, as image shares."""
+    """Return whether focal length or principal point of two CameraInfo differ, as image shares.
+
+    One without a calibration is no other lens.
+    """
+    matrix = info_array(message, "k").reshape(3, 3)
+    if matrix_problem(matrix, message.width, message.height):
+        return False
 
     def shares(info: Any) -> NDArray[np.float64]:
         size = np.array([[info.width or 1.0], [info.height or 1.0]])
@@ -62,16 +81,22 @@ def is_other_lens(message: Any, first: Any) -> bool:
     return not np.allclose(shares(message), k, rtol=_STEADY, atol=_STEADY * k[0, 0])
 
 
-def info_remark(message: Any, info_topic: str) -> str:
+def info_remark(message: Any, info_topic: str, image_topic: str) -> str:
     """Return what a user should know of a valid CameraInfo; empty if all is usual."""
-    if is_rectified_only(message):
-        return (
+    k, found = _lens(message, image_topic)[0], []
+    if not info_array(message, "k").any():
+        found.append(
             f"K in {info_topic} is all zero, so its P is used: expected rectified images, without "
             "distortion"
         )
-    k = info_array(message, "k").reshape(3, 3)
-    found = unusual(k, int(message.width), int(message.height))
-    return f"{info_topic}: {found}" if found else ""
+    elif is_rectified(message, image_topic):
+        found.append(
+            f"{image_topic} has rectified images by its name, so P of {info_topic} is used, and "
+            "neither K nor D"
+        )
+    if is_unusual := unusual(k, int(message.width), int(message.height)):
+        found.append(f"{info_topic}: {is_unusual}")
+    return "; ".join(found)
 
 
 def info_array(message: Any, name: str) -> NDArray[np.float64]:
@@ -94,13 +119,11 @@ def info_content(message: Any) -> tuple[Any, ...]:
 def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Calibration:
     """Return the calibration of the images that go with a sensor_msgs/CameraInfo.
 
-    The matrix is adapted to the region of interest and to binning. R is not used, and P only if K
-    is all zero: the images are rectified then. Raises CameraError, which names both topics, if K is
-    zero or impossible.
+    The matrix is adapted to the region of interest and to binning. R is not used, and P only if the
+    images are rectified. Raises CameraError, which names both topics, if K is zero or impossible,
+    or the region lies outside of the image.
     """
-    k, distortion = info_array(message, "k").reshape(3, 3), info_array(message, "d")
-    if is_rectified_only(message):
-        k, distortion = info_array(message, "p").reshape(3, 4)[:, :3].copy(), np.zeros(5)
+    k, distortion = _lens(message, image_topic)
     width, height = int(message.width), int(message.height)
     # Without a size, K cannot be checked; the size itself is refused later.
     problem = matrix_problem(k, width, height) if width > 0 < height else ""
@@ -113,7 +136,15 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
             "this package's camera node"
         )
     roi = message.roi
-    if roi.width and roi.height and (roi.width, roi.height) != (width, height):
+    is_region = bool(roi.width and roi.height and (roi.width, roi.height) != (width, height))
+    if is_region:
+        if roi.x_offset + roi.width > width or roi.y_offset + roi.height > height:
+            raise CameraError(
+                f"the region of interest in {info_topic} is {roi.width}x{roi.height} px at "
+                f"({roi.x_offset}, {roi.y_offset}), outside of images of {width}x{height}; "
+                f"expected the part of them that {image_topic} has: correct the camera's driver, "
+                "or give --fov DEG or --calibration FILE"
+            )
         k[0, 2] -= roi.x_offset
         k[1, 2] -= roi.y_offset
         width, height = int(roi.width), int(roi.height)
@@ -129,4 +160,5 @@ def calibration_from_info(message: Any, image_topic: str, info_topic: str) -> Ca
         message.distortion_model,
         message.header.frame_id,
         told_by="CameraInfo",
+        region_px=int(roi.width) if is_region else 0,
     )

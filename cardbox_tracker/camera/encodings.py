@@ -53,8 +53,7 @@ class _Encoding(NamedTuple):
     #: across and down, pixels that share a colour of YUV; None for other colours. With two channels
     #: it lies beside the brightness, with one in rows below all brightness.
     shared: tuple[int, int] | None = None
-    #: place of the brightness in a pixel of two channels; place of u in a colour below.
-    order: int = 0
+    order: int = 0  #: place of the brightness in a pixel of two channels
 
 
 _MONO = _Encoding(1, None, cv2.COLOR_GRAY2BGR)
@@ -80,8 +79,9 @@ _ENCODINGS = _EIGHT_BITS | {
     **{name.replace("8", "16"): kind._replace(word_bytes=2) for name, kind in _EIGHT_BITS.items()},
     **dict.fromkeys(("yuv422", "uyvy"), _Encoding(2, shared=(2, 1), order=1)),
     **dict.fromkeys(("yuv422_yuy2", "yuyv"), _Encoding(2, shared=(2, 1))),
-    "nv12": _Encoding(1, shared=(2, 2)),
-    "nv21": _Encoding(1, shared=(2, 2), order=1),
+    # Brightness from 16 to 235, as OpenCV and with it cv_bridge read and write these two.
+    "nv12": _Encoding(1, None, cv2.COLOR_YUV2BGR_NV12, shared=(2, 2)),
+    "nv21": _Encoding(1, None, cv2.COLOR_YUV2BGR_NV21, shared=(2, 2)),
     "nv24": _Encoding(1, shared=(1, 1)),
 }
 
@@ -111,6 +111,8 @@ def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
     counts. Raises EncodingError if the encoding is not supported or the bytes do not fit it.
     """
     raw, kind = _pixels(sent, levels)
+    if kind.shared is not None and kind.to_bgr is not None:
+        return brightness_of(cv2.cvtColor(raw, kind.to_bgr))
     if kind.shared is not None:
         return np.ascontiguousarray(raw[: sent.height] if raw.ndim == 2 else raw[..., kind.order])
     return raw if kind.to_grey is None else np.asarray(cv2.cvtColor(raw, kind.to_grey), np.uint8)
@@ -119,16 +121,16 @@ def decode_grey(sent: SentImage, levels: Levels | None = None) -> ImageArray:
 def decode_bgr(sent: SentImage, levels: Levels | None = None) -> ImageArray:
     """Return the colours (H, W, 3) uint8, bgr, of an image; see :func:`decode_grey`."""
     raw, kind = _pixels(sent, levels)
+    if kind.to_bgr is not None:
+        return np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
     if kind.shared is None:
-        return raw if kind.to_bgr is None else np.asarray(cv2.cvtColor(raw, kind.to_bgr), np.uint8)
+        return raw
     height, width, (across, down) = sent.height, sent.width, kind.shared
     if raw.ndim == 3:
         brightness, colours = raw[..., kind.order], raw[..., 1 - kind.order]
     else:
         brightness, colours = raw[:height], raw[height:]
     pairs = colours.reshape(height // down, width // across, 2)
-    if raw.ndim == 2 and kind.order:
-        pairs = pairs[..., ::-1]
     each = cv2.resize(np.ascontiguousarray(pairs), (width, height), interpolation=cv2.INTER_NEAREST)
     # The brightness has the full range, and is that of the grey image.
     yuv = np.dstack([brightness, each])

@@ -29,6 +29,8 @@ from cardbox_tracker.common.small_yaml import read_small_text
 
 # Two sources that differ by more do not belong to the same calibration.
 _AGREE_DEG, _AGREE_M = 1.0, 0.02
+# Calibrations that were optimized can have more than half a turn, but not a whole one.
+_MOST_TURN_RAD = 2 * math.pi
 
 
 class FrameTransform(NamedTuple):
@@ -190,10 +192,11 @@ def load_extrinsics(path: str | os.PathLike[str], cameras: Sequence[str]) -> dic
     name = os.fspath(path)
     with foreign(path, CameraError, _EXPECTED):
         text = read_small_text(path)
-        data = tomllib.loads(text) if name.endswith(".toml") else parsed_storage(text)
+        is_toml = name.lower().endswith(".toml")
+        data = tomllib.loads(text) if is_toml else parsed_storage(text)
         entries = data if isinstance(data, Mapping) else {}
         entries = {str(key): entry for key, entry in entries.items() if isinstance(entry, Mapping)}
-        if name.endswith(".toml"):
+        if is_toml:
             poses = _metres(_aniposelib(entries, name))
         elif isinstance(data, Mapping) and {"R", "T"} <= data.keys():
             poses = _metres(_stereo(data, name, cameras))
@@ -265,13 +268,18 @@ def _camchain(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, 
 
 def _aniposelib(entries: Mapping[str, Mapping[str, Any]], name: str) -> dict[str, Extrinsics]:
     """Return transforms from the world frame of the file into each camera, by name."""
-    return {
-        str(entry.get("name", key)): Extrinsics.of_vectors(
-            entry["rotation"], entry["translation"], f"{name}, {key}"
-        )
-        for key, entry in entries.items()
-        if "rotation" in entry and "translation" in entry
-    }
+    poses = {}
+    for key, entry in entries.items():
+        if "rotation" in entry and "translation" in entry:
+            place, turn = f"{name}, {key}", entry["rotation"]
+            pose = Extrinsics.of_vectors(turn, entry["translation"], place)
+            if (turn_rad := float(np.linalg.norm(np.asarray(turn, np.float64)))) > _MOST_TURN_RAD:
+                raise CameraError(
+                    f"{place}: the rotation vector is {turn_rad:.3g} rad long; expected at most "
+                    f"{_MOST_TURN_RAD:.3g}: are these degrees?"
+                )
+            poses[str(entry.get("name", key))] = pose
+    return poses
 
 
 def _stereo(data: Mapping[str, Any], name: str, cameras: Sequence[str]) -> dict[str, Extrinsics]:

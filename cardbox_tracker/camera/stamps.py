@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections import Counter, deque
 from collections.abc import Iterable
 from enum import Enum
+from itertools import islice
 from statistics import median_low
 
 from cardbox_tracker.common.health import WATCHES
@@ -289,8 +290,7 @@ class RecordedStamps:
         ahead_ns, waited_ns = time_ns - before_ns, recorded_ns - recorded_before_ns
         jump_s = 0.0 if is_unstamped or waited_ns >= _PAUSE_NS else (ahead_ns - waited_ns) / 1e9
         is_set = WATCHES["clock set"].is_beyond(jump_s)
-        if is_set:
-            self._jump_s = self._jump_s or jump_s
+        self._jump_s = max(self._jump_s, jump_s)
         if self._last is not None and (is_back or is_set or time_ns <= before_ns):
             time_ns = before_ns + max(waited_ns, 1)
             if not is_unstamped:
@@ -300,5 +300,6 @@ class RecordedStamps:
 
     def remarks(self) -> list[str]:
         """Return texts on all faults, as :meth:`StreamStatistics.remarks`."""
-        jump = WATCHES["clock set"].remark(self._jump_s)
-        return [*self.statistics.remarks().values(), *([jump] if jump else [])]
+        names = "clock set", "stamps ahead of the recorder"
+        jumps = filter(None, (WATCHES[name].remark(self._jump_s) for name in names))
+        return [*self.statistics.remarks().values(), *islice(jumps, 1)]

@@ -41,6 +41,7 @@ from cardbox_tracker.common.files import (
 from cardbox_tracker.common.processes import cores, results_of
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.detectors.point_table import PointTable
+from cardbox_tracker.recordings.bag_files import lone_parts
 from cardbox_tracker.recordings.open_images import FORMULA, SUMMARY, recordings_in
 from cardbox_tracker.recordings.result_table import check_table
 from cardbox_tracker.recordings.track import TrackSummary
@@ -113,6 +114,13 @@ def track_folder(asked: TrackArguments) -> None:
     recordings = recordings_in(folder, output)
     formats = _formats(asked.formats or ())
     _check_output(output, folder, recordings, asked.force)
+    if parts := lone_parts(recordings.values()):
+        print(
+            f"cardbox: {_listed(parts)} are recordings of their own, and times count from each "
+            "one's start; if they are parts of one, complete them, or join those that are left "
+            f"with 'ros2 bag reindex {folder}'",
+            file=sys.stderr,
+        )
     before = _read_rows(output / SUMMARY)
     jobs, rows = _jobs(asked, recordings, formats)
     reasons = list(_reasons(rows.values(), recordings))
@@ -334,9 +342,12 @@ def _reasons(rows: Iterable[Row], paths: Mapping[str, Path]) -> Iterator[tuple[s
             common = row.reason.replace(str(paths[row.recording]), "")
             reasons.setdefault(common, []).append(row)
     for failed in reasons.values():
-        listed = ", ".join(row.recording for row in failed[:_MOST_NAMES])
-        more = f" and {len(failed) - _MOST_NAMES} more" if len(failed) > _MOST_NAMES else ""
-        yield f"{listed}{more}", failed[0].reason
+        yield _listed([row.recording for row in failed]), failed[0].reason
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = f" and {len(names) - _MOST_NAMES} more" if len(names) > _MOST_NAMES else ""
+    return f"{', '.join(names[:_MOST_NAMES])}{more}"
 
 
 def digest_of_inputs(request: TrackingRequest, formats: Sequence[str], program: str) -> str:

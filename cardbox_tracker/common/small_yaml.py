@@ -77,6 +77,7 @@ def read_small_text(path: str | os.PathLike[str]) -> str:
     except UnreadableFileError as error:
         raise SmallYamlError(str(error)) from None
     try:
-        return data.decode("utf-8")
+        # Editors of Windows begin a file with a byte order mark.
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError:
         raise SmallYamlError("it is not a text file") from None

@@ -12,6 +12,7 @@ import json
 import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -197,7 +198,7 @@ def _orders(content: dict[str, Any], file: Path) -> dict[str, Layouts]:
     if isinstance(of_mmpose, dict) and isinstance(of_mmpose.get("keypoint_id2name"), dict):
         names = of_mmpose["keypoint_id2name"]
         declared = {"": [names.get(str(i)) for i in range(len(names))]}
-    orders = {kind: [_declared(str(name)) for name in names] for kind, names in declared.items()}
+    orders = {kind: [plain_name(str(name)) for name in names] for kind, names in declared.items()}
     people = {kind: of for kind, of in orders.items() if set(_SHOULDERS) <= set(of)}
     if declared and not people:
         listed = quoted(", ".join(map(str, next(iter(declared.values())))))
@@ -208,7 +209,8 @@ def _orders(content: dict[str, Any], file: Path) -> dict[str, Layouts]:
     return {kind if len(orders) > 1 else "": {len(of): of} for kind, of in people.items()}
 
 
-def _declared(name: str) -> str:
+@lru_cache(maxsize=1024)
+def plain_name(name: str) -> str:
     """Return our name of a point that a file names; the same name if it is not used."""
     found = _DECLARED.fullmatch(re.sub("[^a-z0-9]", "", name.lower()))
     if found is None:

@@ -22,7 +22,12 @@ from cardbox_tracker.detectors.image_points import (
     ImagePoints,
     LegPoints,
 )
-from cardbox_tracker.detectors.keypoint_json import coco_people, image_numbers, openpose_people
+from cardbox_tracker.detectors.keypoint_json import (
+    coco_people,
+    image_numbers,
+    openpose_people,
+    plain_name,
+)
 from cardbox_tracker.detectors.person_choice import LEAST_INSIDE, inside, near_person, person_in
 from cardbox_tracker.detectors.point_checks import (
     Size,
@@ -110,7 +115,7 @@ class PointTable(NamedTuple):
         return GivenPoints(path, "name" if is_named else FRAME, persons, most_score=most)
 
     def _read_table(self, camera: str | None, size: Size | None) -> tuple[str, Persons, float]:
-        most = 0.0
+        most, names = 0.0, dict[str, None]()
         found: dict[tuple[Key, str], dict[str, list[float]]] = {}
         first_lines: dict[tuple[Key, str], int] = {}
         counts = Counter[str]()
@@ -122,7 +127,8 @@ class PointTable(NamedTuple):
                 for row in rows:
                     if camera is not None and row["camera"] != camera:
                         continue
-                    image, joint = _image_of(row[column], column), row["joint"]
+                    image, joint = _image_of(row[column], column), plain_name(row["joint"] or "")
+                    names.setdefault(joint)
                     # A cell that is empty is missing, as in tables of pandas.
                     u, v, score = (
                         float("nan" if row[name] == "" else row[name]) for name in COLUMNS[2:]
@@ -152,6 +158,11 @@ class PointTable(NamedTuple):
             ) from None
         except CardboxError as error:
             raise CardboxError(f"{self.path}, line {rows.line_num}: {error}") from None
+        if names and not _USED & names.keys():
+            raise CardboxError(
+                f"{self.path} names its points {quoted(', '.join(names))}; expected names such as "
+                "left_shoulder in the column joint"
+            )
         persons: Persons = {}
         for key, joints in found.items():
             try:
@@ -233,6 +244,7 @@ class GivenPoints:
             # A video's images have no names, but programs number those that they take out of it.
             numbers = image_numbers(key for key in persons if isinstance(key, str))
             self._numbered = {number: persons[name] for name, number in numbers.items()}
+        self._is_by_number = False
         self.restart()
 
     def restart(self) -> None:
@@ -253,6 +265,7 @@ class GivenPoints:
         """Return the people in an image; none if no points join it."""
         if self.kind == COLUMNS[0]:
             return self._persons.get(self._nearest(image.stamp_ns, tolerance_ns), [])
+        self._is_by_number = self.kind == FRAME or (self.kind == "name" and not image.name)
         if self.kind == "name" and not image.name:
             return self._numbered.get(image.number, [])
         return self._persons.get(image.key(self.kind), [])
@@ -334,6 +347,11 @@ class GivenPoints:
             found.append(
                 f"the points of {self._lying} of {self.used} images are of people who lie; if they "
                 "do not, columns and rows are exchanged: expected u, v"
+            )
+        if self._is_by_number and min(self._numbered or self._stamps, default=0) == 1:
+            found.append(
+                f"the images of {self._path} are numbered from 1 on; expected 0 for the first one: "
+                "if 1 is the first one, all points are an image late, so subtract 1"
             )
         if self._most_score > _ROUNDED:
             found.append(

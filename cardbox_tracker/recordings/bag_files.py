@@ -10,7 +10,7 @@ from __future__ import annotations
 import os
 import re
 import struct
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -160,7 +160,7 @@ FILE_ENDINGS = (".mcap", ".db3", ".bag")
 # rosbag2 numbers the parts of a recording; rosbag of ROS 1 also writes the time of each.
 _PART = re.compile(r"(.*?)(?:_\d{4}(?:-\d\d){5})?_(\d+)")
 # What recorders of some Humble versions leave empty, and channels that this reader leaves out.
-_UNKNOWN_STORAGE = re.compile(r"(?m)^\s*storage_identifier:\s*(?:\"\"|''|~|null)?\s*$")
+_UNKNOWN_STORAGE = re.compile(r"(?m)^\s*storage_identifier:(?![ \t]*[\"']?(?:mcap|sqlite3)\b)")
 _OTHER_FORMAT = re.compile(r"(?m)^\s*serialization_format:\s*(?!\"?'?cdr\b)\S")
 _MOST_APART_NS = 60_000_000_000
 
@@ -181,6 +181,18 @@ def files_of_one(folder: Path) -> list[Path]:
     if len(names) > 1 or sorted(parts) != list(range(len(files))):
         return []
     return [parts[number] for number in range(len(files))]
+
+
+def lone_parts(paths: Iterable[Path]) -> list[str]:
+    """Return names of bags with the same name but for a number from 0 on: parts that lack others.
+
+    Takes are usually counted from 1.
+    """
+    groups: dict[tuple[Path, str], dict[int, str]] = {}
+    for path in filter(is_bag_file, paths):
+        if (part := _PART.fullmatch(path.stem)) is not None:
+            groups.setdefault((path.parent, part[1]), {})[int(part[2])] = path.name
+    return [name for of in groups.values() if len(of) > 1 and 0 in of for name in of.values()]
 
 
 def paths_to_open(folder: Path) -> list[Path]:

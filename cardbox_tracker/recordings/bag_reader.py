@@ -196,9 +196,11 @@ class BagReader:
         found = sorted(
             name for name in names if self.topics[name] in types and name.startswith(folder)
         )
-        if len(found) > 1 and camera is not None:
+        inside = {f"{name.removesuffix('/compressed').rpartition('/')[0]}/" for name in found}
+        if len(found) > 1 and (camera is not None or len(inside) == 1):
             # Depth and further images of the same camera can have topics in this namespace.
-            usual = [name for name in found if name.removeprefix(folder) in _IMAGE_NAMES]
+            start = folder or min(inside)
+            usual = [name for name in found if name.removeprefix(start) in _IMAGE_NAMES]
             found = usual[:1] or found
         if len(found) != 1:
             where = f" below {folder}" if folder else ""

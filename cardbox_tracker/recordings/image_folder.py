@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cardbox_tracker.camera.encodings import MOST_PIXELS, Levels, decode_compressed
-from cardbox_tracker.common.errors import BagError, EncodingError
+from cardbox_tracker.common.errors import BagError, EncodingError, quoted
 from cardbox_tracker.common.files import UnreadableFileError, read_regular
 from cardbox_tracker.recordings.image_recording import Film, RecordedImage
 
@@ -120,5 +120,13 @@ class ImageFolder(Film):
 
     @property
     def remarks(self) -> list[str]:
-        """Remarks on the field of view, and on the range of images of 16 bits."""
-        return [*super().remarks, *([self._levels.text] if self._levels.text else [])]
+        """Remarks on the field of view, on the range of images of 16 bits, and on other cameras."""
+        series = Counter(re.sub(r"\d+", "", path.stem) for path in self._files)
+        found = [*super().remarks, *([self._levels.text] if self._levels.text else [])]
+        # Names without numbers in common are names of single images.
+        if len(series) > 1 and len(set(series.values())) == 1 < min(series.values()):
+            found.append(
+                f"{self.path} has {len(series)} series of images, {quoted(', '.join(series))}, and "
+                "uses one after the other as those of one camera; give each camera its own folder"
+            )
+        return found

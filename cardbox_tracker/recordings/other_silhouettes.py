@@ -15,6 +15,7 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.depth_image import DepthImage, at_size, depth_from_image
 from cardbox_tracker.camera.pairing import TOLERANCE_NS, side_by_side
 from cardbox_tracker.common.errors import BagError, CardboxError
+from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import silhouette_of
@@ -71,12 +72,13 @@ class DepthSilhouetteSource(SilhouetteSource):
         self._find_points(points, camera)
         self._within, self.depth_topic = within, within.topic
         self._without, self._nearest_m, self._is_near = 0, math.inf, False
+        self._mostly_near = self._with_depth = 0
 
     def frames(self, start_s: float = 0.0, end_s: float = float("inf")) -> Iterator[RecordedFrame]:
         """Yield every image from ``start_s`` to ``end_s`` that has a depth image, in order."""
         depths = depth_images(self._bag.path, self._within.topic, self.camera)
         streams: list[Iterator[Any]] = [self.images(end_s), depths]
-        self._without = 0
+        self._without = self._mostly_near = self._with_depth = 0
         self._start_points(start_s, end_s)
         for seen, measured in side_by_side(streams, lambda item: int(item[0]), TOLERANCE_NS):
             if seen is None:
@@ -89,6 +91,8 @@ class DepthSilhouetteSource(SilhouetteSource):
                 self._without += 1
                 continue
             silhouette = silhouette_within(measured[1], self._within.metres)
+            self._with_depth += 1
+            self._mostly_near += WATCHES["near"].is_beyond(float(np.mean(silhouette > 0)))
             self._is_near = self._is_near or bool(silhouette.any())
             if not self._is_near:
                 self._nearest_m = min(self._nearest_m, nearest_m(measured[1]))
@@ -103,6 +107,12 @@ class DepthSilhouetteSource(SilhouetteSource):
             found.append(
                 f"{self._without} images have no depth image of the same time on {topic} and are "
                 "skipped"
+            )
+        if 2 * self._mostly_near > self._with_depth:
+            found.append(
+                f"most of {topic} is nearer than --within {self._within.metres:g} m in "
+                f"{self._mostly_near} images: choose it between the person and the wall, and "
+                "correct the unit if 16UC1 is not in millimetres or 32FC1 not in metres"
             )
         if self._is_near:
             return found

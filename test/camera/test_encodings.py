@@ -260,9 +260,10 @@ def sent_as(encoding: str, bgr: Bytes) -> tuple[bytes, int]:
     width = bgr.shape[1]
     y, u, v = np.moveaxis(cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV), 2, 0)
     if encoding in ("nv12", "nv21"):
-        u, v = u[::2, ::2], v[::2, ::2]
+        rows = cv2.cvtColor(bgr, cv2.COLOR_BGR2YUV_I420)
+        u, v = rows[len(bgr) :].reshape(2, len(bgr) // 2, width // 2)
         pairs = np.dstack([u, v] if encoding == "nv12" else [v, u])
-        return y.tobytes() + pairs.tobytes(), width
+        return rows[: len(bgr)].tobytes() + pairs.tobytes(), width
     if encoding == "nv24":
         return y.tobytes() + np.dstack([u, v]).tobytes(), width
     if encoding == "8UC1":

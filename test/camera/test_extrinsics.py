@@ -83,9 +83,16 @@ def test_a_group_of_aniposelib_may_be_in_millimetres(
         turn = cv2.Rodrigues(pose.rotation)[0].ravel().tolist()
         moved = (unit * pose.translation_m).tolist()
         text += f'[cam_{name}]\nname = "{name}"\nrotation = {turn}\ntranslation = {moved}\n'
-    file = tmp_path / "group.toml"
+    file = tmp_path / "group.TOML"
     file.write_text(text + "[metadata]\nadjusted = false\n", encoding="utf-8")
     assert_same(load_extrinsics(file, ["a", "b"])["b"], poses[1].after(poses[0].inverse()))
+
+
+def test_a_rotation_vector_of_more_than_a_turn_is_refused(tmp_path: Path) -> None:
+    file = tmp_path / "group.toml"
+    file.write_text("[a]\nrotation = [0, 45, 0]\ntranslation = [1, 0, 0]\n", encoding="utf-8")
+    with pytest.raises(CameraError, match=r"is 45 rad long; .*degrees"):
+        load_extrinsics(file, ["a", "b"])
 
 
 @pytest.mark.parametrize("unit", [1.0, 1000.0])

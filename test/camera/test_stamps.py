@@ -206,6 +206,14 @@ def test_a_clock_that_is_set_forward_goes_on_with_the_recorders(jump_s: int) -> 
     assert f"jump forward by {jump_s} s" in remarks[0]
 
 
+def test_images_that_are_lost_without_a_pause_of_the_recorder_are_told() -> None:
+    stamps = [*even(6), *even(6, START + 5 * S)]
+    times, (remark,) = times_of(stamps)
+    assert times == stamps
+    assert "jump forward by 4.6 s" in remark
+    assert "images were lost" in remark
+
+
 def test_a_pause_of_recorder_and_camera_is_one() -> None:
     stamps = [*even(6), *(stamp + 3600 * S for stamp in even(12)[6:])]
     recorded = RecordedStamps()

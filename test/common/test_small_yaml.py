@@ -95,6 +95,12 @@ def test_what_is_refused_needs_little_memory() -> None:
 
 
 @pytest.mark.promise("No input fills memory, disk or log, or holds up a program")
+def test_a_byte_order_mark_does_no_harm(tmp_path: Path) -> None:
+    path = tmp_path / "file.yaml"
+    path.write_text("a: 1\n", encoding="utf-8-sig")
+    assert read_small_text(path) == "a: 1\n"
+
+
 def test_a_pipe_is_not_waited_for_and_a_device_not_read(tmp_path: Path) -> None:
     fifo = tmp_path / "fifo"
     os.mkfifo(fifo)

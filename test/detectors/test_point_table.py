@@ -582,3 +582,24 @@ def test_a_folder_without_files_of_openpose_is_refused(tmp_path: Path) -> None:
     (tmp_path / "points.json").rename(tmp_path / "points_1.json")
     with pytest.raises(CardboxError, match="has no list 'people'"):
         PointTable(tmp_path).read(None)
+
+
+@pytest.mark.parametrize("first", [0, 1, 2])
+def test_numbers_of_images_that_begin_with_1_are_told(tmp_path: Path, first: int) -> None:
+    """Programs that take images out of a video often count them from 1."""
+    for number in range(first, 5):
+        openpose(tmp_path / "points", number, [10.0, 20.0, 0.9] * 17)
+    found = read(PointTable(tmp_path / "points"))
+    found.all_in(Image(0, 0))
+    assert ("numbered from 1 on" in found.remark) == (first == 1)
+
+
+def test_a_table_may_spell_joints_in_other_ways_but_must_know_one(tmp_path: Path) -> None:
+    found = read(table(tmp_path, "5,LShoulder,1,2,1", "5,Right Shoulder,3,4,1", "5,tail,5,6,1"))
+    (points,) = found.all_in(Image(5, 5))
+    assert points.px[POINT_INDEX["left_shoulder"]].tolist() == [1.0, 2.0]
+    assert points.px[POINT_INDEX["right_shoulder"]].tolist() == [3.0, 4.0]
+    with pytest.raises(CardboxError, match="names its points 'hombro, tail'; expected"):
+        read(table(tmp_path, "5,hombro,1,2,1", "5,tail,5,6,1"))
+    with pytest.raises(CardboxError, match="line 2, has a value that is no number"):
+        read(table(tmp_path, "5"))

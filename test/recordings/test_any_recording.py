@@ -142,6 +142,16 @@ def test_a_given_rate_replaces_that_of_the_file(tmp_path: Path) -> None:
         assert video.duration_s == pytest.approx(11 / 240)
 
 
+def test_images_of_two_cameras_in_one_folder_are_told(tmp_path: Path) -> None:
+    for name in ("left01.png", "left02.png", "right01.png", "right02.png"):
+        cv2.imwrite(str(tmp_path / name), np.zeros((12, 16), np.uint8))
+    with open_images(tmp_path, GivenCamera(fov_deg=60.0)) as images:
+        assert "2 series of images, 'left, right'" in images.remarks[-1]
+    (tmp_path / "right02.png").unlink()
+    with open_images(tmp_path, GivenCamera(fov_deg=60.0)) as images:
+        assert not images.remarks
+
+
 def test_images_are_in_the_order_of_their_numbers(tmp_path: Path) -> None:
     for number in (0, 2, 10, 9, 1):
         cv2.imwrite(str(tmp_path / f"f{number}.JPG"), np.full((48, 64, 3), 20 * number, np.uint8))

@@ -15,6 +15,7 @@ from rosbags.rosbag1 import Writer as Writer1
 from rosbags.typesys import Stores, get_typestore
 
 from cardbox_tracker.common.errors import BagError, CameraError, CardboxError, EncodingError
+from cardbox_tracker.recordings.bag_files import lone_parts
 from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.bag_writer import BagWriter
 from cardbox_tracker.recordings.given_camera import GivenCamera
@@ -127,6 +128,73 @@ def test_the_first_camera_info_with_a_calibration_counts(tmp_path: Path, empty: 
         found = bag.calibration()
         assert (found.width, found.height, found.k[0, 0]) == (160, 120, 165.0)
         assert any(f"first {empty} messages on /camera_info" in text for text in bag.remarks)
+
+
+@pytest.mark.parametrize("size", [(0, 0), (160, 120)])
+def test_a_camera_info_without_a_calibration_is_no_zoom(
+    tmp_path: Path, size: tuple[int, int]
+) -> None:
+    store = get_typestore(Stores.ROS2_JAZZY)
+    empty = info(store, *size, K if size == (0, 0) else (0.0,) * 9)
+    infos = [info(store)] * 4 + [empty] * 4
+    with open_images(recorded(tmp_path / "bag", infos=infos)) as bag:
+        assert bag.calibration().k[0, 0] == 165.0
+        assert bag.remarks == []
+
+
+@pytest.mark.parametrize(
+    ("region", "fault"),
+    [
+        ((40, 30, 80, 60), "is 80 px wide, but the images of /image_raw have 160x120"),
+        ((100, 80, 80, 60), "80x60 px at (100, 80), outside of images of 160x120"),
+    ],
+)
+def test_a_region_that_is_not_that_of_the_images_is_refused(
+    tmp_path: Path, region: tuple[int, int, int, int], fault: str
+) -> None:
+    wrong = info(get_typestore(Stores.ROS2_JAZZY))
+    wrong.roi.x_offset, wrong.roi.y_offset, wrong.roi.width, wrong.roi.height = region
+    with (
+        open_images(recorded(tmp_path / "bag", infos=[wrong])) as bag,
+        pytest.raises(CameraError, match=re.escape(fault)),
+    ):
+        bag.calibration()
+    # Images may be of the region before binning.
+    wrong.roi.x_offset = wrong.roi.y_offset = 0
+    wrong.width, wrong.height, wrong.roi.width, wrong.roi.height = 320, 240, 160, 120
+    wrong.binning_x = wrong.binning_y = 2
+    with open_images(recorded(tmp_path / "binned", infos=[wrong])) as bag:
+        assert (bag.calibration().width, bag.calibration().k[0, 0]) == (80, 82.5)
+
+
+@pytest.mark.parametrize("name", ["image_rect", "image_rect_color", "rect/image"])
+def test_images_that_are_rectified_by_their_name_have_p_and_no_distortion(
+    tmp_path: Path, name: str
+) -> None:
+    """The CameraInfo beside those of image_proc is that of the raw images."""
+    of_raw = info(get_typestore(Stores.ROS2_JAZZY))
+    of_raw.d[0] = -0.3
+    of_raw.p[[0, 2, 5, 6]] = 140.0, 119.5, 140.0, 59.5
+    with open_images(recorded(tmp_path / "bag", (f"/{name}",), [of_raw])) as bag:
+        found = bag.calibration()
+        assert (found.k[0, 0], found.k[0, 2], found.is_distorted) == (140.0, 119.5, False)
+        told = " ".join(bag.remarks)
+        assert "so P of /camera_info is used" in told
+        assert "principal point (119.5, 59.5) px is far from the middle" in told
+
+
+def test_further_images_in_the_namespace_of_a_camera_are_left_out(tmp_path: Path) -> None:
+    """The root namespace has no name by which a user could choose it."""
+    topics = "/image_raw", "/image_rect"
+    with open_images(recorded(tmp_path / "bag", topics)) as bag:
+        assert bag.image_topic() == "/image_raw"
+        assert bag.left_out("/image_raw") == ["the images on /image_rect"]
+    topics = "/left/image_raw", "/right/image_raw"
+    with (
+        open_images(recorded(tmp_path / "two", topics)) as bag,
+        pytest.raises(BagError, match="2 image topics"),
+    ):
+        bag.image_topic()
 
 
 def test_the_frame_is_that_of_the_images_if_the_camera_info_has_none(tmp_path: Path) -> None:
@@ -311,6 +379,14 @@ def test_files_of_other_names_are_recordings_of_their_own(
         BagReader(folder).__enter__()
 
 
+def test_parts_of_which_one_is_missing_are_named() -> None:
+    def found(*numbers: int) -> list[str]:
+        return lone_parts([Path("all", f"take_{number}.mcap") for number in numbers])
+
+    assert found(0, 2) == ["take_0.mcap", "take_2.mcap"]
+    assert found(1, 2) == found(0) == lone_parts([Path("a_0.mcap"), Path("b_2.mcap")]) == []
+
+
 def test_parts_that_are_apart_are_refused(tmp_path: Path) -> None:
     folder = tmp_path / "session"
     folder.mkdir()
@@ -321,7 +397,7 @@ def test_parts_that_are_apart_are_refused(tmp_path: Path) -> None:
         BagReader(folder).__enter__()
 
 
-@pytest.mark.parametrize("empty", ['""', "''", ""])
+@pytest.mark.parametrize("empty", ['""', "''", "", "null", "other"])
 @pytest.mark.parametrize("storage", ["mcap", "sqlite3"])
 def test_metadata_without_a_storage_are_those_of_the_files(
     tmp_path: Path, storage: str, empty: str

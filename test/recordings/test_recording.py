@@ -158,6 +158,10 @@ def test_depth_images_cut_out_the_person_without_a_background(two: Path, tmp_pat
         list(source.first.frames())
         (_, remark) = source.first.remarks
         assert "--within 1.2 m: the nearest depths are 1.5 m" in remark
+    with RecordingRequest(folder, Within("/one/depth", 3.5), ["one"]).open() as source:
+        list(source.first.frames())
+        (_, remark) = source.first.remarks
+        assert "most of /one/depth is nearer than --within 3.5 m in 9 images" in remark
     with (
         pytest.raises(CardboxError, match="one camera"),
         RecordingRequest(folder, within, ["one", "two"]).open(),

@@ -145,6 +145,8 @@ class Robot:
             speed = min(one.speed, max_speed)
             given = "" if np.isfinite(one.speed) else ", the URDF gives none"
             limits = f"{one.lower:.2f} to {one.upper:.2f} {unit}"
+            if unit == "rad" and 4 * math.pi < max(-one.lower, one.upper) <= 360.0:
+                limits += ", are these degrees?"
             rows.append((name, role, limits, f"{speed:g} {unit}/s{given}"))
         widths = [max(len(row[column]) for row in rows) for column in range(4)]
         return "\n".join("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)

@@ -38,6 +38,13 @@ def test_a_robot_is_read() -> None:
     assert speed.tolist() == [0.2, math.inf]
 
 
+@pytest.mark.parametrize(("upper", "is_asked"), [("1.7", False), ("90", True), ("1e9", False)])
+def test_limits_that_seem_to_be_degrees_are_told(upper: str, is_asked: bool) -> None:
+    limit = f'type="revolute"><limit lower="0" upper="{upper}" velocity="1"/>'
+    robot = parse_robot(URDF.replace('type="continuous">', limit))
+    assert ("are these degrees?" in robot.table({"turns": "arm"}, 1.0)) == is_asked
+
+
 @pytest.mark.parametrize(
     ("old", "new", "expected"),
     [

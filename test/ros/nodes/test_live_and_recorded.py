@@ -26,6 +26,8 @@ from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 K = [165.0, 0.0, 79.5, 0.0, 165.0, 59.5, 0.0, 0.0, 1.0]
 BENT = [-0.03, 0.035, -0.0001, -0.0001, -0.012]
 GREY = np.random.default_rng(0).integers(0, 256, (120, 160)).astype(np.uint8)
+# The same with brightness from 16 to 235.
+LIMITED = np.rint(16 + GREY * (219 / 255)).astype(np.uint8)
 START_S = 1_700_000_000
 
 
@@ -180,7 +182,7 @@ def pairs(u_first: bool) -> np.ndarray:
         ("8UC3", np.dstack([GREY] * 3), 480),
         ("yuyv", pairs(False), 320),
         ("uyvy", pairs(True), 320),
-        ("nv12", np.concatenate([GREY, np.full((60, 160), 128, np.uint8)]), 160),
+        ("nv12", np.concatenate([LIMITED, np.full((60, 160), 128, np.uint8)]), 160),
         ("nv24", np.concatenate([GREY, np.full((240, 160), 128, np.uint8)]), 160),
         ("mono16", GREY.astype("<u2") << 2, 320),
         ("16UC1", GREY.astype("<u2") << 6, 320),

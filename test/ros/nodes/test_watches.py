@@ -486,7 +486,16 @@ def clock_set(measures: Sequence[float]) -> Told:
         for at_ns in (10 * S, 10 * S + PERIOD_NS):
             stamps.add(at_ns, at_ns)
         stamps.add(10 * S + 2 * PERIOD_NS + round(jump_s * S), 10 * S + 2 * PERIOD_NS)
-        yield bool(stamps.remarks())
+        yield any("was set. Times" in remark for remark in stamps.remarks())
+
+
+def stamps_ahead(measures: Sequence[float]) -> Told:
+    """The same, up to the remark on stamps that are believed."""
+    for jump_s in measures:
+        stamps = RecordedStamps()
+        for at_ns, recorded_ns in ((10 * S, 10 * S), (10 * S + round(jump_s * S), 10 * S + 1)):
+            stamps.add(at_ns, recorded_ns)
+        yield any("late by as much" in remark for remark in stamps.remarks())
 
 
 def single(publishers: dict[str, int]) -> SinglePublisher:
@@ -583,6 +592,7 @@ CASES = [
     Case("other calibration", 29, 30, other_calibration),
     Case("wrong calibration", 0.09, 0.11, wrong_calibration),
     Case("clock set", 9.8, 10.2, clock_set),
+    Case("stamps ahead of the recorder", 1.9, 2.1, stamps_ahead),
     Case("publishers", 1, 2, publishers),
     Case("no publisher", 5, 6, no_publisher),
     Case("no camera", 150, 151, lambda measures: no_publisher(measures, 0)),
