@@ -160,9 +160,6 @@ def _add(parser: argparse.ArgumentParser, name: str) -> Callable[[argparse.Names
         return run
     module = import_module(f"cardbox_tracker.commands.{name.replace('-', '_')}")
     add_options(parser, module.Arguments)
-    if name == "track":
-        # Legs need no option any more, and commands that were written with it still run.
-        parser.add_argument("--legs", action="store_true", help=argparse.SUPPRESS)
     return lambda options: module.run(module.Arguments.of(options))
 
 

@@ -56,12 +56,6 @@ def test_help_lists_the_subcommands(cardbox: Callable) -> None:
         assert re.search(rf"^ +{name}\s+[a-z]", done.out, re.MULTILINE)
 
 
-def test_commands_with_the_former_option_of_legs_still_run(cardbox: Callable) -> None:
-    done = cardbox("track", "missing.mp4", "--legs")
-    assert done.code == 1
-    assert "there is no recording missing.mp4" in done.err
-
-
 @pytest.mark.parametrize("name", NAMES)
 def test_every_subcommand_explains_itself_and_its_options(name: str, cardbox: Callable) -> None:
     done = cardbox(name, "--help")
