@@ -35,20 +35,16 @@ def track(
     without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
     if the recording cannot be read, or a result cannot be written.
     """
-    recording, person, files = request.recording, request.person, request.files
+    person, files = request.person, request.files
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
-    with measured_scene(recording, person, request.config, request.seed) as (
-        source,
-        scene,
-        chosen,
-    ):
+    with measured_scene(request) as measured:
+        source, scene, chosen, found = measured
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
-        for film in source.films:
-            print_remarks(film.remarks(source.names[0], source.first.duration_s))
-        early = source.first.remarks
-        print_remarks(_with_unknown(early, person))
+        early, known = source.first.remarks, (source.names[0], source.first.duration_s)
+        of_films = (film.remarks(*known) for film in source.films)
+        print_remarks(found, *of_films, _with_unknown(early, person))
         number = None if chosen is None else chosen.number
         summary = _tracked(request, source, scene, observers, show, number)
         print_remarks(one for one in source.first.remarks if one not in early)
