@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,11 +17,8 @@ from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
 from cardbox_tracker.recordings.recording import Recording
-from cardbox_tracker.recordings.result_table import result_table
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
 from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.hands import Look
 from cardbox_tracker.tracking.session import Session, trackers_as_seen
 from cardbox_tracker.tracking.smoother import OF_RECORDINGS, Smoother, Smoothing
 from cardbox_tracker.tracking.tracker import Tracker
@@ -77,81 +72,58 @@ def _summary(
 
 def track_recording(
     recording: Recording,
-    bodies: Sequence[BodyModel],
-    config: TrackerConfig,
-    seed: int,
-    start_s: float,
-    table: Path | None = None,
-    observers: tuple[Observer, ...] = (),
-    end_s: float = math.inf,
-    people: int | None = None,
-    look: Look | None = None,
+    session: Session,
+    span: TimeSpan,
+    observers: Sequence[Observer] = (),
     smoothing: Smoothing = OF_RECORDINGS,
-    only: int | None = None,
 ) -> TrackSummary:
-    """Track every image from ``start_s`` to ``end_s``.
+    """Track every image of a span, in whose first one the person stands in the front posture.
 
-    Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
-    reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
-    :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
-    called for each image, and for each of several people. ``smoothing`` is that of
-    :class:`~cardbox_tracker.tracking.smoother.Smoother`, by default of recordings. The other
-    arguments are those of :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the
-    results are those of one person without a number. Raises CardboxError if no image lies after
-    ``start_s``, or a file cannot be written.
+    ``observers``, such as a table, a progress bar or a bag writer, are called for each image, and
+    for each of several people. With ``only`` one of a session, the results are those of one person
+    without a number. Raises CardboxError if no image lies in the span.
     """
-    first, rng = recording.first, np.random.default_rng(seed)
-    given = recording.others, people if only is None else 0, look
-    session = Session(bodies, first.camera, config, rng, *given, only=only)
-    found, cuts_s = list[Quality](), list[float]()
-    has = {"has_points": first.has_points, "has_people": people is not None}
-    has |= {"has_hands": look is not None, "is_smoothed": smoothing.lag_s > 0.0}
-    has |= {"has_rates": smoothing.has_rates}
+    found, cuts_s, frames = list[Quality](), list[float](), 0
     smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](smoothing)
     as_seen: list[Tracker] = []
-    with nullcontext() if table is None else result_table(table, **has) as add_row:
 
-        def tell(
-            seen: Iterable[tuple[tuple[RecordedFrame, list[Tracker]], list[Estimate]]],
-        ) -> None:
-            for (frame, trackers), estimates in seen:
-                for estimate, tracker, quality in zip(estimates, trackers, found, strict=False):
-                    quality(frame, estimate, tracker)
-                    if add_row is not None:
-                        roll_rad = tracker.body.camera_pose.roll_rad
-                        add_row(frame, estimate.as_camera_stands(roll_rad))
-                    for observe in observers:
-                        observe(frame, estimate, tracker)
+    def tell(
+        seen: Iterable[tuple[tuple[RecordedFrame, list[Tracker]], list[Estimate]]],
+    ) -> None:
+        for (frame, trackers), estimates in seen:
+            for estimate, tracker, quality in zip(estimates, trackers, found, strict=False):
+                quality(frame, estimate, tracker)
+                for observe in observers:
+                    observe(frame, estimate, tracker)
 
-        frames = 0
-        for taken in recording.frames(start_s, end_s):
-            frames += 1
-            if taken.first.is_cut and frames > 1:
-                cuts_s.append(taken.time_s)
-                tell(smoother.finish())
-                smoother = Smoother(smoothing)
-            estimates = session.track(taken.observations)
-            if only is not None:
-                estimates = [replace(one, person=None) for one in estimates]
-            found += [Quality() for _ in estimates[len(found) :]]
-            as_seen = trackers_as_seen(as_seen, session.trackers)
-            image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
-            tell(smoother.add(image, taken.stamp_ns, estimates, of))
-            session.check_cameras()
-        tell(smoother.finish())
-        if frames == 0:
-            raise CardboxError(
-                f"no image lies after --start {start_s:g} s; give seconds from its start"
-            )
-        faults = [source.points_fault for source in recording.sources]
-        if all(faults):
-            raise CardboxError(faults[0])
+    for taken in recording.frames(*span):
+        frames += 1
+        if taken.first.is_cut and frames > 1:
+            cuts_s.append(taken.time_s)
+            tell(smoother.finish())
+            smoother = Smoother(smoothing)
+        estimates = session.track(taken.observations)
+        if not session.is_several:
+            estimates = [replace(one, person=None) for one in estimates]
+        found += [Quality() for _ in estimates[len(found) :]]
+        as_seen = trackers_as_seen(as_seen, session.trackers)
+        image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
+        tell(smoother.add(image, taken.stamp_ns, estimates, of))
+        session.check_cameras()
+    tell(smoother.finish())
+    if frames == 0:
+        raise CardboxError(
+            f"no image lies after --start {span.start_s:g} s; give seconds from its start"
+        )
+    faults = [source.points_fault for source in recording.sources]
+    if all(faults):
+        raise CardboxError(faults[0])
     session.check_cameras(is_last=True)
     bodies = [tracker.body for tracker in session.trackers]
-    optional = ("points", first.has_points), ("depth", recording.measures_depth)
+    optional = ("points", recording.first.has_points), ("depth", recording.measures_depth)
     names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
     used, each = dict[str, int](), dict[int, TrackSummary]()
-    if people is None:
+    if not session.is_several:
         used = {name: 0 for name, is_given in optional if is_given} | {
             names.get(name, name): count for name, count in session.trackers[0].used.items()
         }
