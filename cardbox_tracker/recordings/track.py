@@ -6,7 +6,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 
@@ -146,20 +146,14 @@ def track_recording(
 
 
 _MOST_REASONS, _ELSEWHERE = 3, "hand may be elsewhere"
-MOST_MOMENTS, GAP_S = 5, 3.0
-"""Number of worst moments that are named, and the least time between two of them, s."""
+# Number of worst moments that are named.
+_MOST_MOMENTS = 5
+GAP_S = 3.0
+"""Least time between two worst moments, s."""
 
 _HANDS = [KEYPOINT_NAMES.index(f"{side}_hand") for side in ("left", "right")]
 _SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 _ANGLES = [number for number, name in enumerate(JOINT_NAMES) if UNITS[name] == "rad"]
-
-
-class _Moment(NamedTuple):
-    """An image whose posture may be wrong: its chance, its time, and what is doubtful."""
-
-    chance: float
-    time_s: float
-    what: str
 
 
 class Quality:
@@ -177,7 +171,7 @@ class Quality:
         self._reasons, self._pitch = Counter[str](), (0.0, 0.0)
         self._is_one_camera = True
         self.fits: list[tuple[int, float]] = []
-        self._moments: list[_Moment] = []
+        self._moments: list[tuple[float, int, tuple[float, str]]] = []
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
         self._distances_m: list[float] = []
@@ -207,7 +201,8 @@ class Quality:
             self._pitch = tracker.body.camera_pose.pitch_rad, estimate.pitch_stddev_rad
         if estimate.state in (UNCERTAIN, LOST):
             self._reasons[estimate.reason or estimate.state] += 1
-            self._moments.append(_moment(frame.time_s, estimate))
+            chance, what = _moment(estimate)
+            self._moments.append((chance, frame.stamp_ns, (frame.time_s, what)))
         if estimate.posture is None or estimate.posture_stddev is None:
             return
         self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
@@ -268,29 +263,34 @@ class Quality:
             if self._distances_m:
                 typical.append(f"{100 * np.median(self._distances_m):.0f} cm of the distance")
             yield f"typical standard deviation: {', '.join(typical)}"
-        if worst := self._worst():
-            moments = (f"{one.time_s:.1f} s ({one.what})" for one in worst)
+        if worst := sorted(worst_moments(self._moments, _MOST_MOMENTS)):
+            moments = (f"{time_s:.1f} s ({what})" for time_s, what in worst)
             yield f"least sure, look at them: {', '.join(moments)}"
 
-    def _worst(self) -> list[_Moment]:
-        """Return up to ``MOST_MOMENTS`` moments of the highest chances, in the order of time."""
-        found: list[_Moment] = []
-        for one in sorted(self._moments, key=lambda one: (-one.chance, one.time_s)):
-            if all(abs(one.time_s - other.time_s) >= GAP_S for other in found):
-                found.append(one)
-            if len(found) == MOST_MOMENTS:
-                break
-        return sorted(found, key=lambda one: one.time_s)
+
+T = TypeVar("T")
 
 
-def _moment(time_s: float, estimate: Estimate) -> _Moment:
+def worst_moments(moments: Iterable[tuple[float, int, T]], most: int) -> list[T]:
+    """Return up to ``most`` moments, of a badness and a stamp, ns, each, ``GAP_S`` or more apart.
+
+    The worst one comes first, and the earlier one of equal ones.
+    """
+    found = list[tuple[float, int, T]]()
+    for one in sorted(moments, key=lambda one: (-one[0], one[1])):
+        if len(found) < most and all(abs(one[1] - other[1]) >= 1e9 * GAP_S for other in found):
+            found.append(one)
+    return [moment for *_, moment in found]
+
+
+def _moment(estimate: Estimate) -> tuple[float, str]:
+    """Return the chance that a posture is wrong, and what is doubtful."""
     states, chances = estimate.keypoint_states, estimate.keypoint_chances
     if states is None or chances is None:
-        return _Moment(1.0, time_s, estimate.state)
+        return 1.0, estimate.state
     doubtful = [
         KEYPOINT_NAMES[hand].replace("_", " ")
         for hand in _HANDS
         if states[hand] in (KeypointState.UNCERTAIN, KeypointState.LOST)
     ]
-    what = " and ".join(doubtful) or "whole posture"
-    return _Moment(float(np.max(chances)), time_s, what)
+    return float(np.max(chances)), " and ".join(doubtful) or "whole posture"

@@ -36,6 +36,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import STATE_NAMES
 from cardbox_tracker.recordings.result_reader import KeptResults, Results
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.track import worst_moments
 from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -57,8 +58,6 @@ def header_of(method: Method) -> tuple[str, ...]:
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
 
-MOST_MOMENTS, GAP_S = 6, 3.0
-"""Number of worst moments, and the least time between two of them, s."""
 LONGEST_STEP = 3.0
 """An image counts until the next one, for at most this multiple of the usual interval."""
 MOST_IMAGES = 1200
@@ -68,6 +67,7 @@ for up to 39 images a second; about 40 MB."""
 # A separate random stream leaves the tracker's random numbers unchanged.
 _STREAM = 0x52756C61
 _WIDTH_PX, _QUALITY = 640, 80
+_MOST_MOMENTS = 6
 
 
 @dataclass(frozen=True)
@@ -166,19 +166,10 @@ class ScoreObserver:
         return [row for results in kept.results().values() for row in self._score(results)]
 
 
-def worst_moments(
-    rows: Sequence[RulaRow], most: int = MOST_MOMENTS, gap_s: float = GAP_S
-) -> tuple[RulaRow, ...]:
-    """Return up to ``most`` images with the highest expected scores, ``gap_s`` or more apart.
-
-    The earlier one of equal scores comes first. Images without a posture do not count.
-    """
-    found: list[RulaRow] = []
-    for row in sorted(rows, key=lambda row: (-row.worst, row.stamp_ns)):
-        is_apart = all(abs(row.stamp_ns - one.stamp_ns) >= gap_s * 1e9 for one in found)
-        if len(found) < most and row.worst and is_apart:
-            found.append(row)
-    return tuple(found)
+def worst_rows(rows: Sequence[RulaRow]) -> list[RulaRow]:
+    """Return the images with the highest expected scores, the worst one first."""
+    scored = ((row.worst, row.stamp_ns, row) for row in rows if row.worst)
+    return worst_moments(scored, _MOST_MOMENTS)
 
 
 @dataclass(frozen=True)
