@@ -57,10 +57,10 @@ def load_gmm() -> FloatArray:
     return gmm
 
 
-def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
-    """Sample arms from the mixture: unit vectors of upper arm and forearm, (count, 6)."""
-    data = _data()
-    rng = np.random.default_rng(seed)
+def sample_bank() -> FloatArray:
+    """Sample arms from the mixture: unit vectors of upper arm and forearm, (3000, 6)."""
+    data, count = _data(), 3000
+    rng = np.random.default_rng(0)
     shares = np.array(data["shares"])
     chosen = rng.choice(len(shares), count, p=shares / shares.sum())
     means = np.array(data["means"])

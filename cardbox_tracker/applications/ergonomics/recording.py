@@ -60,9 +60,9 @@ MEAN_POSTURE = "mean_posture"
 
 LONGEST_STEP = 3.0
 """An image counts until the next one, for at most this multiple of the usual interval."""
-MOST_IMAGES = 1200
-"""Images that are kept. Each worst moment excludes the images within ``GAP_S``, so this suffices
-for up to 39 images a second; about 40 MB."""
+# Images that are kept. Each worst moment excludes the images within GAP_S, so this suffices for up
+# to 39 images a second; about 40 MB.
+_MOST_IMAGES = 1200
 
 # A separate random stream leaves the tracker's random numbers unchanged.
 _STREAM = 0x52756C61
@@ -90,17 +90,16 @@ class RulaRow:
 class MomentImages:
     """The images of the highest scores, with the model drawn over them."""
 
-    def __init__(self, is_head_hidden: bool = True, most: int = MOST_IMAGES) -> None:
-        """Keep up to ``most`` images; ``is_head_hidden`` makes the heads unrecognizable."""
+    def __init__(self, is_head_hidden: bool = True) -> None:
+        """Start without images; ``is_head_hidden`` makes the heads unrecognizable."""
         self.is_head_hidden = is_head_hidden
-        self._most = most
         # The lowest score comes first, and of equal scores the latest image.
         self._kept: list[tuple[float, int, bytes]] = []
 
     def add(self, row: RulaRow, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Keep the image of ``row`` if its score is among the highest."""
         rank = row.worst, -row.stamp_ns
-        if not row.worst or (len(self._kept) == self._most and rank < self._kept[0][:2]):
+        if not row.worst or (len(self._kept) == _MOST_IMAGES and rank < self._kept[0][:2]):
             return
         picture, camera, body = frame.image, tracker.camera, tracker.body
         if self.is_head_hidden:
@@ -110,7 +109,7 @@ class MomentImages:
         canvas = draw_overlay(picture, body, camera, estimate, scale)
         _, jpeg = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         heapq.heappush(self._kept, (*rank, jpeg.tobytes()))
-        if len(self._kept) > self._most:
+        if len(self._kept) > _MOST_IMAGES:
             heapq.heappop(self._kept)
 
     def by_stamp(self) -> dict[int, bytes]:

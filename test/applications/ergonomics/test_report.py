@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.ergonomics import recording
 from cardbox_tracker.applications.ergonomics.recording import (
     MomentImages,
     RulaRow,
@@ -349,9 +350,10 @@ def observed(images: MomentImages, *pitches_rad: float, state: str = TRACKING) -
     return observer
 
 
-def test_the_images_of_the_worst_moments_are_kept() -> None:
+def test_the_images_of_the_worst_moments_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trunks of 1, 3 and 4 give 2, 3 and 4 or more; of equal scores the first ones stay."""
-    images = MomentImages(most=2)
+    monkeypatch.setattr(recording, "_MOST_IMAGES", 2)
+    images = MomentImages()
     rows = observed(images, 0.0, 0.6, 1.2, 0.6, 0.0).rows
     assert sorted(images.by_stamp()) == [1 * 10**9, 2 * 10**9]
     worst, *_ = worst_rows(rows)
