@@ -15,9 +15,11 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.scene import Scene
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
+from cardbox_tracker.person.posture import ROLL
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, SHOULDERS, KeypointState
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
+from cardbox_tracker.search.doubt import HANDS
 from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, UNCERTAIN, Estimate
 from cardbox_tracker.tracking.session import Session, trackers_as_seen
 from cardbox_tracker.tracking.smoother import OF_RECORDINGS, Smoother, Smoothing
@@ -151,10 +153,6 @@ _MOST_MOMENTS = 5
 GAP_S = 3.0
 """Least time between two worst moments, s."""
 
-_HANDS = [KEYPOINT_NAMES.index(f"{side}_hand") for side in ("left", "right")]
-_SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
-_ANGLES = [number for number, name in enumerate(JOINT_NAMES) if UNITS[name] == "rad"]
-
 
 class Quality:
     """Observer that counts the results of one person; see :meth:`lines`.
@@ -192,7 +190,7 @@ class Quality:
         self._sure += estimate.state == TRACKING
         self._filled += estimate.state == FILLED
         states = estimate.keypoint_states or ()
-        sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
+        sure = [states[hand] == KeypointState.TRACKED for hand in HANDS] if states else []
         self._sure_hands += sum(sure)
         place = estimate.place
         self._sure_places += place is not None and place.state == KeypointState.TRACKED
@@ -205,10 +203,10 @@ class Quality:
             self._moments.append((chance, frame.stamp_ns, (frame.time_s, what)))
         if estimate.posture is None or estimate.posture_stddev is None:
             return
-        self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
+        self._angles_rad += estimate.posture_stddev[ROLL:].tolist()
         moved = estimate.posture + np.diag(estimate.posture_stddev)
         points_m = pose(tracker.body, np.vstack([estimate.posture, moved])).keypoints_m
-        hands_m = points_m[:, _HANDS] - points_m[:, _SHOULDERS].mean(axis=1, keepdims=True)
+        hands_m = points_m[:, HANDS] - points_m[:, SHOULDERS].mean(axis=1, keepdims=True)
         self._hands_m += np.linalg.norm(hands_m[1:] - hands_m[0], axis=(0, 2)).tolist()
         if place is not None:
             self._distances_m.append(float(place.stddev_m[0]))
@@ -290,7 +288,7 @@ def _moment(estimate: Estimate) -> tuple[float, str]:
         return 1.0, estimate.state
     doubtful = [
         KEYPOINT_NAMES[hand].replace("_", " ")
-        for hand in _HANDS
+        for hand in HANDS
         if states[hand] in (KeypointState.UNCERTAIN, KeypointState.LOST)
     ]
     return float(np.max(chances)), " and ".join(doubtful) or "whole posture"
