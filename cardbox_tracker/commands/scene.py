@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import replace
 from itertools import zip_longest
 from statistics import median
+from typing import NamedTuple
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.commands.arguments import print_remarks
-from cardbox_tracker.commands.tracking_request import PersonRequest
+from cardbox_tracker.commands.tracking_request import PersonRequest, TrackingRequest
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.detectors.person_choice import Chosen, PersonChoice
 from cardbox_tracker.measuring.people_camera import (
@@ -44,8 +45,7 @@ from cardbox_tracker.recordings.measured_scene import (
     watch,
 )
 from cardbox_tracker.recordings.recording import Recording, RecordingRequest
-from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
-from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.tracking.place import distance_of_points, shoulders_m
 
 # Relative difference of the distances of a person who stands where the scene has them, seconds in
@@ -55,87 +55,107 @@ _SAME_PLACE, _SAME_S, _CONTRADICTS = 0.15, 1.5, 3.0
 _SURE = 2.0
 
 
+class MeasuredScene(NamedTuple):
+    """An open recording and its scene."""
+
+    source: Recording
+    scene: Scene
+    chosen: Chosen | None  #: who is chosen of several people, if there is a choice
+    remarks: Sequence[str] = ()  #: what was found, or contradicts what is given
+
+
 @contextmanager
-def measured_scene(
-    recording: RecordingRequest, person: PersonRequest, config: TrackerConfig, seed: int
-) -> Iterator[tuple[Recording, Scene, Chosen | None]]:
+def measured_scene(request: TrackingRequest) -> Iterator[MeasuredScene]:
     """Open a recording whose scene is measured, in all of it, before it is tracked.
 
-    A roll that is found turns the images back, unless one is given. The third is who is chosen of
-    several people, if there is a choice. Raises CardboxError if the recording cannot be read, the
-    detector cannot be loaded, or nobody can be chosen.
+    A roll that is found turns the images back, unless one is given. Raises CardboxError if the
+    recording cannot be read, the detector cannot be loaded, or nobody can be chosen.
     """
-    if person.model is not None and not person.body.unknown and person.scene is None:
-        roll_rad = person.body.camera_pose.roll_rad
-        recording = replace(recording, camera=recording.camera.standing(roll_rad))
+    recording, person = request.recording, request.person
     with ExitStack() as stack:
 
         def opened(asked: RecordingRequest) -> Recording:
             stack.close()
             return stack.enter_context(asked.open())
 
-        source = opened(recording)
-        span = person.start_s, person.end_s
-        bodies, first = [person.body, *person.others], source.first
-        tilt = person.body.camera_pose
         if person.scene is not None:
-            yield source, *_again(source, recording, person, person.scene, config, seed)
-            return
-        if person.model is not None and not person.body.unknown:
-            pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
-            roll_rad = recording.camera.stands_rad
-            camera = SceneCamera(lens_of(first.camera), pitch, Value(roll_rad, 0.0, GIVEN))
-            bodies = [body.with_values(camera_roll_rad=roll_rad) for body in bodies]
-            chosen = None
-            if person.choice is not None:
-                chosen = _checked(watch(source, *span, person.choice).chosen)
-            yield source, Scene(_told(camera, first), tuple(bodies)), chosen
-            return
-        choice = person.choice
-        watched = watch(source, *span, choice)
-        background = lens = None
-        if recording.shows_turns:
-            moves = camera_moves(watched.people, watched.pictures, first.camera)
-            if moves and lens_of(first.camera).origin == USUAL:
-                lens = lens_in(source, *span)
-            if lens is not None:
-                seeing = recording.camera.seeing(lens.mean, lens.stddev)
-                recording = replace(recording, camera=seeing)
-                source = opened(recording)
-                first = source.first
-                print_remarks([_found_lens(lens)])
-            turns = turns_in(source, watched, *span) if moves else None
-            background = Background(moves)
-            if turns is not None:
-                recording = replace(recording, turned=turns[0])
-                source = opened(recording)
-                choice = choice and turns[0].placed(choice)
-                watched, first = watch(source, *span, choice), source.first
-                background = Background(edges=turns[1])
-                print_remarks([turns[0].remark])
-        found = found_camera(recording, person, watched, first.camera, background)
-        if lens is not None:
-            # Turned images are wider than those in which it was found.
-            shown = found.camera.fov_rad._replace(origin=lens.origin, by=lens.by)
-            found = found._replace(camera=found.camera._replace(fov_rad=shown))
-        better = _corrected(recording, found.camera)
-        if better is not recording:
-            source = opened(better)
-            watched, first = watch(source, *span, choice), source.first
-        chosen = _checked(watched.chosen)
-        stands = {"camera_roll_rad": better.camera.stands_rad}
-        bodies = [body.with_values(**stands) for body in _bodies(bodies, person, found)]
-        if chosen is not None:
-            given = config, 0, seed, *span
-            bodies = seen_people(source, bodies, *given, only=chosen.number)
-        elif person.people is None:
-            longest = _longest(found)
-            stature_m = person.stature_m or USUAL_STATURE_M
-            far = longest and longest._replace(distances=longest.distances * stature_m)
-            bodies = [seen_person(watched, bodies[0], first.camera, config, seed, far)]
+            yield _again(opened(recording), request, person.scene)
+        elif person.model is not None and not person.body.unknown:
+            standing = recording.camera.standing(person.body.camera_pose.roll_rad)
+            recording = replace(recording, camera=standing)
+            yield _known(opened(recording), recording, person)
         else:
-            bodies = seen_people(source, bodies, config, person.people, seed, *span)
-        yield source, Scene(_told(found.camera, first), tuple(bodies)), chosen
+            yield _found(opened, request)
+
+
+def _known(source: Recording, recording: RecordingRequest, person: PersonRequest) -> MeasuredScene:
+    """Return the scene of a body model that has its place."""
+    chosen, tilt = None, person.body.camera_pose
+    pitch = Value(tilt.pitch_rad, tilt.pitch_stddev_rad, GIVEN)
+    roll = Value(recording.camera.stands_rad, 0.0, GIVEN)
+    camera = SceneCamera(lens_of(source.first.camera), pitch, roll)
+    if person.choice is not None:
+        chosen = _checked(watch(source, person.start_s, person.end_s, person.choice).chosen)
+    return MeasuredScene(source, _scene(camera, source, _standing(recording, person)), chosen)
+
+
+def _found(
+    opened: Callable[[RecordingRequest], Recording], request: TrackingRequest
+) -> MeasuredScene:
+    """Return the scene that people and the room show, of a recording opened as these show it."""
+    recording, person = request.recording, request.person
+    span, choice, remarks = (person.start_s, person.end_s), person.choice, list[str]()
+    source = opened(recording)
+    watched, background, lens = watch(source, *span, choice), None, None
+    if recording.shows_turns:
+        camera = source.first.camera
+        moves = camera_moves(watched.people, watched.pictures, camera)
+        if moves and lens_of(camera).origin == USUAL:
+            lens = lens_in(source, *span)
+        if lens is not None:
+            recording = replace(recording, camera=recording.camera.seeing(lens.mean, lens.stddev))
+            source = opened(recording)
+            remarks.append(_found_lens(lens))
+        turns = turns_in(source, watched, *span) if moves else None
+        background = Background(moves)
+        if turns is not None:
+            recording = replace(recording, turned=turns[0])
+            source = opened(recording)
+            choice = choice and turns[0].placed(choice)
+            watched, background = watch(source, *span, choice), Background(edges=turns[1])
+            remarks.append(turns[0].remark)
+    found = found_camera(recording, person, watched, source.first.camera, background)
+    if lens is not None:
+        # Turned images are wider than those in which it was found.
+        shown = found.camera.fov_rad._replace(origin=lens.origin, by=lens.by)
+        found = found._replace(camera=found.camera._replace(fov_rad=shown))
+    better = _corrected(recording, found.camera)
+    if better is not recording:
+        source = opened(better)
+        watched = watch(source, *span, choice)
+    longest, stature_m = _longest(found), person.stature_m or USUAL_STATURE_M
+    far = longest and longest._replace(distances=longest.distances * stature_m)
+    guesses = [*_bodies(_standing(better, person), person, found)]
+    bodies = _seen(source, watched, guesses, request, far)
+    scene = _scene(found.camera, source, bodies)
+    return MeasuredScene(source, scene, watched.chosen, [*remarks, *found.remarks])
+
+
+def _seen(
+    source: Recording,
+    watched: Watched,
+    guesses: Sequence[BodyModel],
+    request: TrackingRequest,
+    far: Distances | None = None,
+) -> list[BodyModel]:
+    """Return the bodies of those who were watched, or of who is chosen of them."""
+    person, chosen = request.person, _checked(watched.chosen)
+    most, only = (person.people, None) if chosen is None else (0, chosen.number)
+    if most is None:
+        known = source.first.camera, request.config, request.seed
+        return [seen_person(watched, guesses[0], *known, far)]
+    given = request.config, most, request.seed, person.start_s, person.end_s
+    return seen_people(source, guesses, *given, only)
 
 
 def _checked(chosen: Chosen | None) -> Chosen | None:
@@ -148,41 +168,30 @@ def _checked(chosen: Chosen | None) -> Chosen | None:
     return chosen
 
 
-def _told(camera: SceneCamera, source: SilhouetteSource) -> SceneCamera:
-    """Return the camera with what tells its field of view."""
-    lens = camera.fov_rad
-    return camera._replace(fov_rad=lens._replace(by=lens.by or source.calibration.told_by))
+def _scene(camera: SceneCamera, source: Recording, bodies: Sequence[BodyModel]) -> Scene:
+    """Return the scene of a camera, with what tells its field of view."""
+    by = camera.fov_rad.by or source.first.calibration.told_by
+    return Scene(camera._replace(fov_rad=camera.fov_rad._replace(by=by)), tuple(bodies))
 
 
-def _again(
-    source: Recording,
-    recording: RecordingRequest,
-    person: PersonRequest,
-    scene: Scene,
-    config: TrackerConfig,
-    seed: int,
-) -> tuple[Scene, Chosen | None]:
-    """Return a given scene, with people who stand elsewhere at their place, and who is chosen.
+def _standing(recording: RecordingRequest, person: PersonRequest) -> list[BodyModel]:
+    """Return the bodies before a camera that is rolled as the recording's is."""
+    roll_rad = recording.camera.stands_rad
+    return [body.with_values(camera_roll_rad=roll_rad) for body in (person.body, *person.others)]
 
-    What is wrong is said. Nobody is sure in a scene that people contradict.
-    """
-    span, camera = (person.start_s, person.end_s), source.first.camera
-    watched = watch(source, *span, person.choice)
-    chosen = _checked(watched.chosen)
-    stands = {"camera_roll_rad": recording.camera.stands_rad}
-    bodies = [body.with_values(**stands) for body in (person.body, *person.others)]
-    wrong = _contradiction(watched, bodies, scene.camera, camera)
-    if wrong:
-        print_remarks([f"{person.model}: {wrong}"])
+
+def _again(source: Recording, request: TrackingRequest, scene: Scene) -> MeasuredScene:
+    """Return a given scene with people where they stand; nobody is sure if they contradict it."""
+    person, camera = request.person, source.first.camera
+    watched = watch(source, person.start_s, person.end_s, person.choice)
+    bodies, remarks = _standing(request.recording, person), list[str]()
+    if wrong := _contradiction(watched, bodies, scene.camera, camera):
+        remarks.append(f"{person.model}: {wrong}")
         bodies = _doubted(bodies, scene)
     guesses = [body.with_values(unknown=tuple({*PLACE, *body.unknown})) for body in bodies]
+    placed, chosen = _seen(source, watched, guesses, request), watched.chosen
     if chosen is not None and chosen.number is not None:
-        placed = seen_people(source, guesses, config, 0, seed, *span, only=chosen.number)
         bodies = [bodies[min(chosen.number, len(bodies)) - 1]]
-    elif person.people is None:
-        placed = [seen_person(watched, guesses[0], camera, config, seed)]
-    else:
-        placed = seen_people(source, guesses, config, person.people, seed, *span)
     # The tracker begins at the place of the scene, and goes on from there.
     kept = [
         body if body is not None and _is_near(body, there) else there
@@ -200,23 +209,21 @@ def _again(
     if not wrong and abs(away) >= _SAME_PLACE:
         seen = watched.people, _statures_m(watched, bodies), camera
         by_floor = other_lens(*seen, scene.camera, away)
-        words = (
-            f"{person.model}: somebody is {math.exp(away):.2f} times as far away as in the scene"
-        )
+        words = f"somebody is {math.exp(away):.2f} times as far away as in the scene"
         if by_floor > _SURE:
-            more = (
-                ", and by the floor it is of another lens or person, so every posture is at best "
+            remarks.append(
+                f"{person.model}: {words}, and by the floor it is of another lens or person, so "
+                "every posture is at best uncertain; leave --scene out"
             )
-            print_remarks([words + more + "uncertain; leave --scene out"])
             kept = _doubted(kept, scene)
         elif by_floor > -_SURE:
-            more = ": they stand elsewhere, or it is of another lens or person, so places are "
-            print_remarks(
-                [words + more + "uncertain; give --fov and --stature in place of --scene"]
+            remarks.append(
+                f"{person.model}: {words}: they stand elsewhere, or it is of another lens or "
+                "person, so places are uncertain; give --fov and --stature in place of --scene"
             )
             unsure = math.hypot(camera.focal_stddev, away)
             source.first.camera = replace(camera, focal_stddev=unsure)
-    return Scene(scene.camera, tuple(kept)), chosen
+    return MeasuredScene(source, Scene(scene.camera, tuple(kept)), chosen, remarks)
 
 
 def _doubted(bodies: Sequence[BodyModel], scene: Scene) -> list[BodyModel]:
@@ -331,25 +338,20 @@ def found_camera(
     camera: Camera,
     background: Background | None = None,
 ) -> FoundCamera:
-    """Return the camera of a recording, and say what was found, or contradicts what is given.
-
-    ``background`` is that of :func:`.scene_camera`.
-    """
+    """Return the camera of a recording; ``background`` is that of :func:`.scene_camera`."""
     people = watched.people
     statures_m = [*person.statures_m, *[person.stature_m] * len(people)][: len(people)]
     tilt = person.body.camera_pose
     given = (tilt.pitch_rad, tilt.pitch_stddev_rad) if person.is_pitch_given else None
     if recording.detector is None and recording.points is None:
-        pitch = Value(0.0, math.hypot(USUAL_PITCH, PITCH_PRIOR), USUAL)
-        if given is None:
-            level = (
-                "nothing tells the camera's pitch without a detector: a level camera is assumed, "
-                "so leans are uncertain; give --camera-pitch-deg (0 for a level camera)"
-            )
-            print_remarks([level])
-        else:
-            pitch = Value(*given, GIVEN)
-        return FoundCamera(SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL)))
+        level = (
+            "nothing tells the camera's pitch without a detector: a level camera is assumed, "
+            "so leans are uncertain; give --camera-pitch-deg (0 for a level camera)"
+        )
+        usual = Value(0.0, math.hypot(USUAL_PITCH, PITCH_PRIOR), USUAL)
+        pitch = Value(*given, GIVEN) if given else usual
+        assumed = SceneCamera(lens_of(camera), pitch, Value(0.0, 0.0, USUAL))
+        return FoundCamera(assumed, remarks=() if given else (level,))
     # Images are turned back by a roll that is given.
     roll_rad = None if recording.camera.roll_rad is None else 0.0
     distance_m = None
@@ -378,8 +380,7 @@ def found_camera(
         )
     if better.camera.fov_deg != recording.camera.fov_deg:
         remarks.append(_found_lens(found.camera.fov_rad))
-    print_remarks(remarks)
-    return found
+    return found._replace(remarks=tuple(remarks))
 
 
 def _found_lens(fov_rad: Value) -> str:
@@ -396,5 +397,6 @@ def tilt_in(
     with recording.open() as source:
         person = PersonRequest(BodyModel(), None, span.start_s, is_pitch_given=False)
         camera = source.first.camera
-        found = found_camera(recording, person, watch(source, *span, choice), camera).camera
-    return found.pitch_rad.mean, _corrected(recording, found)
+        found = found_camera(recording, person, watch(source, *span, choice), camera)
+    print_remarks(found.remarks)
+    return found.camera.pitch_rad.mean, _corrected(recording, found.camera)

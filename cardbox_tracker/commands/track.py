@@ -152,15 +152,7 @@ def track_one(
     check_outputs((*written, *derived), asked.force, request.inputs, results=(asked.bag,))
     if request.preset == "default":
         compile_for_films()
-    has_points, has_people = request.recording.points is not None, request.person.people is not None
-    has = {
-        "has_points": has_points,
-        "has_people": has_people,
-        "has_hands": request.hands is not None,
-        "is_smoothed": request.smoothing.lag_s > 0.0,
-        "has_rates": request.smoothing.has_rates,
-    }
-    kept = KeptResults(asked.recording, **has)
+    kept = KeptResults(asked.recording, **request.has)
     observers = (kept,) if show is not None or any(derived) else ()
     summary = track_request(replace(request, files=files, force=asked.force), observers, show)
     if asked.json is not None:

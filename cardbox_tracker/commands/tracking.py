@@ -7,6 +7,8 @@ from contextlib import ExitStack
 from dataclasses import replace
 from functools import partial
 
+import numpy as np
+
 from cardbox_tracker.applications.drawing.overlay import draw_sharp_overlay
 from cardbox_tracker.applications.drawing.video import overlay_video
 from cardbox_tracker.commands.arguments import print_remarks
@@ -21,7 +23,10 @@ from cardbox_tracker.person.proportions import USUAL_STATURE_M
 from cardbox_tracker.recordings.given_camera import FOV_HINT, UNKNOWN_LENS
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
+from cardbox_tracker.recordings.result_table import result_table
+from cardbox_tracker.recordings.silhouettes import TimeSpan
 from cardbox_tracker.recordings.track import Observer, TrackSummary, track_recording
+from cardbox_tracker.tracking.session import Session
 
 
 def track(
@@ -35,20 +40,16 @@ def track(
     without it, there are a progress bar and lines on assumptions and quality. Raises CardboxError
     if the recording cannot be read, or a result cannot be written.
     """
-    recording, person, files = request.recording, request.person, request.files
+    person, files = request.person, request.files
     if person.model is not None and person.body.doubt:
         print(f"{person.model}: {person.body.doubt}")
-    with measured_scene(recording, person, request.config, request.seed) as (
-        source,
-        scene,
-        chosen,
-    ):
+    with measured_scene(request) as measured:
+        source, scene, chosen, found = measured
         # Hands and the overlay are seen at the resolution of the recording.
         source.first.has_pictures = request.hands is not None or files.video is not None
-        for film in source.films:
-            print_remarks(film.remarks(source.names[0], source.first.duration_s))
-        early = source.first.remarks
-        print_remarks(_with_unknown(early, person))
+        early, known = source.first.remarks, (source.names[0], source.first.duration_s)
+        of_films = (film.remarks(*known) for film in source.films)
+        print_remarks(found, *of_films, _with_unknown(early, person))
         number = None if chosen is None else chosen.number
         summary = _tracked(request, source, scene, observers, show, number)
         print_remarks(one for one in source.first.remarks if one not in early)
@@ -81,25 +82,17 @@ def _tracked(
     show: Callable[[float], None] | None,
     only: int | None,
 ) -> TrackSummary:
-    person, start_s = request.person, request.person.start_s
-    total_s = max(1e-9, min(source.first.duration_s, person.end_s) - start_s)
+    person, camera, config = request.person, source.first.camera, request.config
+    span, people = TimeSpan(person.start_s, person.end_s), person.people if only is None else 0
+    look = None if request.hands is None else HandNetwork(request.hands)
+    given = config, np.random.default_rng(request.seed), source.others, people, look
+    session = Session(scene.people, camera, *given, only=only)
+    total_s = max(1e-9, min(source.first.duration_s, span.end_s) - span.start_s)
     with ExitStack() as stack:
         observers = (*_writers(request, source, stack), *observers)
         advance = show or stack.enter_context(progress_bar("track"))
-        return track_recording(
-            source,
-            scene.people,
-            request.config,
-            request.seed,
-            start_s,
-            request.files.table,
-            (*observers, lambda frame, *_: advance((frame.time_s - start_s) / total_s)),
-            person.end_s,
-            person.people,
-            None if request.hands is None else HandNetwork(request.hands),
-            request.smoothing,
-            only,
-        )
+        told = (*observers, lambda frame, *_: advance((frame.time_s - span.start_s) / total_s))
+        return track_recording(source, session, span, told, request.smoothing)
 
 
 def _lines(summary: TrackSummary) -> Iterator[str]:
@@ -159,11 +152,16 @@ def _assumptions(request: TrackingRequest, scene: Scene, source: Recording) -> I
 
 
 def _writers(request: TrackingRequest, source: Recording, stack: ExitStack) -> Iterator[Observer]:
-    """Yield what writes bag and video; they appear when ``stack`` is closed without an error."""
-    bag, video = request.files.bag, request.files.video
+    """Yield what writes the files; they appear when ``stack`` is closed without an error."""
+    table, bag, video = request.files.table, request.files.bag, request.files.video
     if video is not None:
         yield stack.enter_context(overlay_video(video, source, request.files.hides_heads))
     if bag is not None:
         frame_id = source.first.frame_id
         draw = partial(draw_sharp_overlay, hides_heads=request.files.hides_heads)
         yield stack.enter_context(result_bag(bag, frame_id, request.force, draw))
+    if table is not None:
+        add_row = stack.enter_context(result_table(table, **request.has))
+        yield lambda frame, estimate, tracker: add_row(
+            frame, estimate.as_camera_stands(tracker.body.camera_pose.roll_rad)
+        )

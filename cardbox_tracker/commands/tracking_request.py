@@ -106,6 +106,17 @@ class TrackingRequest:
     files: TrackFiles = TrackFiles()  #: results to write
     force: bool = False  #: whether an existing bag is replaced
 
+    @property
+    def has(self) -> dict[str, bool]:
+        """What the results have, for :func:`~.recordings.result_table.units`."""
+        return {
+            "has_points": self.recording.points is not None,
+            "has_people": self.person.people is not None,
+            "has_hands": self.hands is not None,
+            "is_smoothed": self.smoothing.lag_s > 0.0,
+            "has_rates": self.smoothing.has_rates,
+        }
+
 
 class Problems:
     """What is wrong with options, collected for one error; values of wrong ones do not matter."""

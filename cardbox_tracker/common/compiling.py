@@ -30,6 +30,7 @@ from types import SimpleNamespace
 from typing import Any, TypeVar
 
 import numba
+import numpy as np
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 
@@ -39,6 +40,10 @@ DAMAGED = (EOFError, UnpicklingError)
 """Errors of a call whose compiled code cannot be read."""
 
 F = TypeVar("F", bound=Callable[..., Any])
+
+Index = int | np.integer[Any]
+index = np.uint64
+"""Makes an index of a kernel unsigned: for those, numba compiles no code for negative ones."""
 
 _LOG = logging.getLogger(__name__)
 _CONFIG: Any = numba.config

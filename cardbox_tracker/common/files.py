@@ -24,6 +24,8 @@ from cardbox_tracker.common.errors import CardboxError, quoted, reason_of
 # Part of the names of temporary files, which can remain after a crash.
 _MARK = ".unfinished-"
 _STEM_LENGTH = 100
+# A background of 4096x4096, the largest working size, has 235 MB.
+_MOST_BYTES = 256 * 1024 * 1024
 # Characters of the names of a table's columns.
 _LONGEST_HEAD = 100_000
 _DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+(?:[eE][-+]?\d+)?")
@@ -170,7 +172,7 @@ def user_path(name: str) -> Path:
 
 
 @contextmanager
-def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[BinaryIO]:
+def regular_file(path: str | os.PathLike[str], most_bytes: int = _MOST_BYTES) -> Iterator[BinaryIO]:
     """Open a regular file of at most ``most_bytes`` for reading; it never waits for a pipe.
 
     Raises UnreadableFileError if the file cannot be opened, is not a regular file, or is larger.
@@ -192,7 +194,7 @@ def regular_file(path: str | os.PathLike[str], most_bytes: int) -> Iterator[Bina
         yield file
 
 
-def read_regular(path: str | os.PathLike[str], most_bytes: int) -> bytes:
+def read_regular(path: str | os.PathLike[str], most_bytes: int = _MOST_BYTES) -> bytes:
     """Return the content of a :func:`regular_file` of at most ``most_bytes``; raises its errors."""
     with regular_file(path, most_bytes) as file:
         try:

@@ -10,11 +10,11 @@ from contextlib import contextmanager
 
 
 @contextmanager
-def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], None]]:
+def progress_bar(text: str) -> Iterator[Callable[[float], None]]:
     """Yield a function that updates the bar to a finished fraction, 0 to 1.
 
-    The bar is drawn again every ``every_s``, because its seconds go on. If errors do not go to a
-    terminal, there is a line for each tenth instead, which fits a file.
+    The bar is drawn again every second. If errors do not go to a terminal, there is a line for each
+    tenth instead, which fits a file.
     """
     if not sys.stderr.isatty():
         told_tenths = -1
@@ -35,7 +35,7 @@ def progress_bar(text: str, every_s: float = 1.0) -> Iterator[Callable[[float], 
     with (
         tqdm(total=100, desc=text, bar_format="{l_bar}{bar}| {elapsed}<{remaining}") as bar,
         # The first run compiles for minutes before the first image; the seconds go on meanwhile.
-        told(lambda _: bar.refresh(), text, every_s),
+        told(lambda _: bar.refresh(), text, 1.0),
     ):
 
         def show(fraction: float) -> None:

@@ -37,8 +37,6 @@ N_PATCHES = len(PATCH_NAMES)
 TORSO_PATCHES = slice(0, 7)
 LEFT_ARM_PATCHES = slice(7, 11)
 RIGHT_ARM_PATCHES = slice(11, 15)
-NECK_PATCHES = slice(15, 16)
-"""Patch of an extended model with a neck, which is not one of the paper's 15."""
 
 
 class PartPatches(NamedTuple):
@@ -46,47 +44,37 @@ class PartPatches(NamedTuple):
 
     trunk: FloatArray
     """Shape (..., 7, 4, 3): torso, waist and head, in the torso's frame."""
-    neck: FloatArray
-    """Shape (..., 1, 4, 3), in the torso's frame; (..., 0, 4, 3) without a neck."""
     upper_arm: FloatArray
     """Shape (..., 2, 4, 3), below the shoulder joint."""
     forearm: FloatArray
     """Shape (..., 2, 4, 3), below the elbow joint."""
 
 
-def part_patches(sizes_m: FloatArray, neck_to_head: float = 0.0) -> PartPatches:
-    """Return the patches of bodies with sizes (..., 18) in the frames of their parts.
-
-    ``neck_to_head`` is the width of the neck as a fraction of the head's; 0 draws none.
-    """
-    parts = parts_of_bodies(sizes_m, neck_to_head)
+def part_patches(sizes_m: FloatArray) -> PartPatches:
+    """Return the patches of bodies with sizes (..., 18) in the frames of their parts."""
+    parts = parts_of_bodies(sizes_m)
     trunk = [_frontal(parts.torso), _sagittal(parts.torso), _lid(parts.torso)]
     for part in (parts.waist, parts.head):
         trunk += [_frontal(part), _sagittal(part)]
-    neck = _frontal(parts.neck)[..., None, :, :]
     upper_arm, forearm = (
         np.stack([_frontal(part), _sagittal(part)], axis=-3)
         for part in (parts.upper_arm, parts.forearm)
     )
-    has_neck = neck_to_head > 0
-    return PartPatches(
-        np.stack(trunk, axis=-3), neck if has_neck else neck[..., :0, :, :], upper_arm, forearm
-    )
+    return PartPatches(np.stack(trunk, axis=-3), upper_arm, forearm)
 
 
-def cardbox_patches(body: BodyModel, postures: FloatArray, neck_to_head: float = 0.0) -> FloatArray:
+def cardbox_patches(body: BodyModel, postures: FloatArray) -> FloatArray:
     """Return the corners of the 15 patches in postures (..., 12), rad and metres: (..., 15, 4, 3).
 
     Shoulders are rigid as in the paper. Corners are metres in the reference frame, in order around
-    the patch, the patches ordered as ``PATCH_NAMES``. With a neck, of this width as a fraction of
-    the head's, its patch follows as the 16th, ``NECK_PATCHES``.
+    the patch, the patches ordered as ``PATCH_NAMES``.
     """
-    return patches_at(body, pose(body.rigid, postures), neck_to_head)
+    return patches_at(body, pose(body.rigid, postures))
 
 
-def patches_at(body: BodyModel, frames: PosedBodies, neck_to_head: float = 0.0) -> FloatArray:
+def patches_at(body: BodyModel, frames: PosedBodies) -> FloatArray:
     """Return the corners of the patches of a posed body, as :func:`cardbox_patches`."""
-    patches = part_patches(body.sizes, neck_to_head)
+    patches = part_patches(body.sizes)
     return np.concatenate(
         [
             _place(patches.trunk, frames.torso_rotation, frames.hip),
@@ -94,7 +82,6 @@ def patches_at(body: BodyModel, frames: PosedBodies, neck_to_head: float = 0.0) 
             _place(patches.forearm, frames.left.forearm_rotation, frames.left.elbow),
             _place(patches.upper_arm, frames.right.upper_arm_rotation, frames.right.shoulder),
             _place(patches.forearm, frames.right.forearm_rotation, frames.right.elbow),
-            _place(patches.neck, frames.torso_rotation, frames.hip),
         ],
         axis=-3,
     )

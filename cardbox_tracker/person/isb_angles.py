@@ -45,7 +45,6 @@ LEAST_BENT_RAD = np.radians(20.0)
 """An elbow straighter than this does not show how the upper arm is rotated."""
 
 _OF_ARM = (("elbow_flexion", 1.0), ("elevation", -1.0), ("plane_of_elevation", 1.0))
-_MIRROR = np.array([1.0, 1.0, -1.0])
 
 
 def isb_angles(states: FloatArray) -> FloatArray:
@@ -91,8 +90,7 @@ def arm_angles(upper_arm: FloatArray, forearm: FloatArray, side: float) -> Float
     Unit vectors (n, 3) in the torso's frame lead from shoulder to elbow, and from there to the
     hand; ``side`` is +1 for the left arm, -1 for the right.
     """
-    mirror = _MIRROR if side > 0 else np.ones(3)
-    upper, lower = (v @ LABORATORY.T * mirror for v in (upper_arm, forearm))
+    upper, lower = (v @ LABORATORY.T * (1.0, 1.0, -side) for v in (upper_arm, forearm))
     normal = np.cross(upper, lower)
     bent = np.linalg.norm(normal, axis=1)
     flexion = np.arctan2(bent, np.sum(upper * lower, axis=1))

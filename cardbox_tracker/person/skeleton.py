@@ -322,6 +322,8 @@ KEYPOINT_NAMES: tuple[str, ...] = (
     *("left_shoulder", "left_elbow", "left_hand"),
     *("right_shoulder", "right_elbow", "right_hand"),
 )
+SHOULDERS = 0, 3
+"""Their places among the keypoints."""
 POINT_NAMES: tuple[str, ...] = ("hip", "neck", "head", *KEYPOINT_NAMES)
 """Points of :func:`.kinematics.pose`: the middle of the hips, the middle of the torso's top, the
 middle of the head, then the keypoints."""

@@ -5,10 +5,8 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 
@@ -17,13 +15,12 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.measuring.scene import Scene
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, UNITS, KeypointState
+from cardbox_tracker.person.posture import ROLL
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, SHOULDERS, KeypointState
 from cardbox_tracker.recordings.recording import Recording
-from cardbox_tracker.recordings.result_table import result_table
-from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.search.config import TrackerConfig
+from cardbox_tracker.recordings.silhouettes import RecordedFrame, TimeSpan
+from cardbox_tracker.search.doubt import HANDS
 from cardbox_tracker.tracking.estimate import FILLED, LOST, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.hands import Look
 from cardbox_tracker.tracking.session import Session, trackers_as_seen
 from cardbox_tracker.tracking.smoother import OF_RECORDINGS, Smoother, Smoothing
 from cardbox_tracker.tracking.tracker import Tracker
@@ -77,81 +74,58 @@ def _summary(
 
 def track_recording(
     recording: Recording,
-    bodies: Sequence[BodyModel],
-    config: TrackerConfig,
-    seed: int,
-    start_s: float,
-    table: Path | None = None,
-    observers: tuple[Observer, ...] = (),
-    end_s: float = math.inf,
-    people: int | None = None,
-    look: Look | None = None,
+    session: Session,
+    span: TimeSpan,
+    observers: Sequence[Observer] = (),
     smoothing: Smoothing = OF_RECORDINGS,
-    only: int | None = None,
 ) -> TrackSummary:
-    """Track every image from ``start_s`` to ``end_s``.
+    """Track every image of a span, in whose first one the person stands in the front posture.
 
-    Both count in seconds from the recording's start; at ``start_s`` the person stands in the front
-    reference posture. The same recording and ``seed`` give the same bytes. ``table`` is a file of
-    :func:`~.result_table.result_table`. ``observers``, such as a progress bar or a bag writer, are
-    called for each image, and for each of several people. ``smoothing`` is that of
-    :class:`~cardbox_tracker.tracking.smoother.Smoother`, by default of recordings. The other
-    arguments are those of :class:`~cardbox_tracker.tracking.session.Session`; with ``only``, the
-    results are those of one person without a number. Raises CardboxError if no image lies after
-    ``start_s``, or a file cannot be written.
+    ``observers``, such as a table, a progress bar or a bag writer, are called for each image, and
+    for each of several people. With ``only`` one of a session, the results are those of one person
+    without a number. Raises CardboxError if no image lies in the span.
     """
-    first, rng = recording.first, np.random.default_rng(seed)
-    given = recording.others, people if only is None else 0, look
-    session = Session(bodies, first.camera, config, rng, *given, only=only)
-    found, cuts_s = list[Quality](), list[float]()
-    has = {"has_points": first.has_points, "has_people": people is not None}
-    has |= {"has_hands": look is not None, "is_smoothed": smoothing.lag_s > 0.0}
-    has |= {"has_rates": smoothing.has_rates}
+    found, cuts_s, frames = list[Quality](), list[float](), 0
     smoother = Smoother[tuple[RecordedFrame, list[Tracker]]](smoothing)
     as_seen: list[Tracker] = []
-    with nullcontext() if table is None else result_table(table, **has) as add_row:
 
-        def tell(
-            seen: Iterable[tuple[tuple[RecordedFrame, list[Tracker]], list[Estimate]]],
-        ) -> None:
-            for (frame, trackers), estimates in seen:
-                for estimate, tracker, quality in zip(estimates, trackers, found, strict=False):
-                    quality(frame, estimate, tracker)
-                    if add_row is not None:
-                        roll_rad = tracker.body.camera_pose.roll_rad
-                        add_row(frame, estimate.as_camera_stands(roll_rad))
-                    for observe in observers:
-                        observe(frame, estimate, tracker)
+    def tell(
+        seen: Iterable[tuple[tuple[RecordedFrame, list[Tracker]], list[Estimate]]],
+    ) -> None:
+        for (frame, trackers), estimates in seen:
+            for estimate, tracker, quality in zip(estimates, trackers, found, strict=False):
+                quality(frame, estimate, tracker)
+                for observe in observers:
+                    observe(frame, estimate, tracker)
 
-        frames = 0
-        for taken in recording.frames(start_s, end_s):
-            frames += 1
-            if taken.first.is_cut and frames > 1:
-                cuts_s.append(taken.time_s)
-                tell(smoother.finish())
-                smoother = Smoother(smoothing)
-            estimates = session.track(taken.observations)
-            if only is not None:
-                estimates = [replace(one, person=None) for one in estimates]
-            found += [Quality() for _ in estimates[len(found) :]]
-            as_seen = trackers_as_seen(as_seen, session.trackers)
-            image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
-            tell(smoother.add(image, taken.stamp_ns, estimates, of))
-            session.check_cameras()
-        tell(smoother.finish())
-        if frames == 0:
-            raise CardboxError(
-                f"no image lies after --start {start_s:g} s; give seconds from its start"
-            )
-        faults = [source.points_fault for source in recording.sources]
-        if all(faults):
-            raise CardboxError(faults[0])
+    for taken in recording.frames(*span):
+        frames += 1
+        if taken.first.is_cut and frames > 1:
+            cuts_s.append(taken.time_s)
+            tell(smoother.finish())
+            smoother = Smoother(smoothing)
+        estimates = session.track(taken.observations)
+        if not session.is_several:
+            estimates = [replace(one, person=None) for one in estimates]
+        found += [Quality() for _ in estimates[len(found) :]]
+        as_seen = trackers_as_seen(as_seen, session.trackers)
+        image, of = (taken.first, as_seen), (tracker.body for tracker in as_seen)
+        tell(smoother.add(image, taken.stamp_ns, estimates, of))
+        session.check_cameras()
+    tell(smoother.finish())
+    if frames == 0:
+        raise CardboxError(
+            f"no image lies after --start {span.start_s:g} s; give seconds from its start"
+        )
+    faults = [source.points_fault for source in recording.sources]
+    if all(faults):
+        raise CardboxError(faults[0])
     session.check_cameras(is_last=True)
     bodies = [tracker.body for tracker in session.trackers]
-    optional = ("points", first.has_points), ("depth", recording.measures_depth)
+    optional = ("points", recording.first.has_points), ("depth", recording.measures_depth)
     names = {f"camera {number}": name for number, name in enumerate(recording.names, 1)}
     used, each = dict[str, int](), dict[int, TrackSummary]()
-    if people is None:
+    if not session.is_several:
         used = {name: 0 for name, is_given in optional if is_given} | {
             names.get(name, name): count for name, count in session.trackers[0].used.items()
         }
@@ -174,20 +148,10 @@ def track_recording(
 
 
 _MOST_REASONS, _ELSEWHERE = 3, "hand may be elsewhere"
-MOST_MOMENTS, GAP_S = 5, 3.0
-"""Number of worst moments that are named, and the least time between two of them, s."""
-
-_HANDS = [KEYPOINT_NAMES.index(f"{side}_hand") for side in ("left", "right")]
-_SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
-_ANGLES = [number for number, name in enumerate(JOINT_NAMES) if UNITS[name] == "rad"]
-
-
-class _Moment(NamedTuple):
-    """An image whose posture may be wrong: its chance, its time, and what is doubtful."""
-
-    chance: float
-    time_s: float
-    what: str
+# Number of worst moments that are named.
+_MOST_MOMENTS = 5
+GAP_S = 3.0
+"""Least time between two worst moments, s."""
 
 
 class Quality:
@@ -205,7 +169,7 @@ class Quality:
         self._reasons, self._pitch = Counter[str](), (0.0, 0.0)
         self._is_one_camera = True
         self.fits: list[tuple[int, float]] = []
-        self._moments: list[_Moment] = []
+        self._moments: list[tuple[float, int, tuple[float, str]]] = []
         self._angles_rad: list[float] = []
         self._hands_m: list[float] = []
         self._distances_m: list[float] = []
@@ -226,7 +190,7 @@ class Quality:
         self._sure += estimate.state == TRACKING
         self._filled += estimate.state == FILLED
         states = estimate.keypoint_states or ()
-        sure = [states[hand] == KeypointState.TRACKED for hand in _HANDS] if states else []
+        sure = [states[hand] == KeypointState.TRACKED for hand in HANDS] if states else []
         self._sure_hands += sum(sure)
         place = estimate.place
         self._sure_places += place is not None and place.state == KeypointState.TRACKED
@@ -235,13 +199,14 @@ class Quality:
             self._pitch = tracker.body.camera_pose.pitch_rad, estimate.pitch_stddev_rad
         if estimate.state in (UNCERTAIN, LOST):
             self._reasons[estimate.reason or estimate.state] += 1
-            self._moments.append(_moment(frame.time_s, estimate))
+            chance, what = _moment(estimate)
+            self._moments.append((chance, frame.stamp_ns, (frame.time_s, what)))
         if estimate.posture is None or estimate.posture_stddev is None:
             return
-        self._angles_rad += estimate.posture_stddev[_ANGLES].tolist()
+        self._angles_rad += estimate.posture_stddev[ROLL:].tolist()
         moved = estimate.posture + np.diag(estimate.posture_stddev)
         points_m = pose(tracker.body, np.vstack([estimate.posture, moved])).keypoints_m
-        hands_m = points_m[:, _HANDS] - points_m[:, _SHOULDERS].mean(axis=1, keepdims=True)
+        hands_m = points_m[:, HANDS] - points_m[:, SHOULDERS].mean(axis=1, keepdims=True)
         self._hands_m += np.linalg.norm(hands_m[1:] - hands_m[0], axis=(0, 2)).tolist()
         if place is not None:
             self._distances_m.append(float(place.stddev_m[0]))
@@ -296,29 +261,34 @@ class Quality:
             if self._distances_m:
                 typical.append(f"{100 * np.median(self._distances_m):.0f} cm of the distance")
             yield f"typical standard deviation: {', '.join(typical)}"
-        if worst := self._worst():
-            moments = (f"{one.time_s:.1f} s ({one.what})" for one in worst)
+        if worst := sorted(worst_moments(self._moments, _MOST_MOMENTS)):
+            moments = (f"{time_s:.1f} s ({what})" for time_s, what in worst)
             yield f"least sure, look at them: {', '.join(moments)}"
 
-    def _worst(self) -> list[_Moment]:
-        """Return up to ``MOST_MOMENTS`` moments of the highest chances, in the order of time."""
-        found: list[_Moment] = []
-        for one in sorted(self._moments, key=lambda one: (-one.chance, one.time_s)):
-            if all(abs(one.time_s - other.time_s) >= GAP_S for other in found):
-                found.append(one)
-            if len(found) == MOST_MOMENTS:
-                break
-        return sorted(found, key=lambda one: one.time_s)
+
+T = TypeVar("T")
 
 
-def _moment(time_s: float, estimate: Estimate) -> _Moment:
+def worst_moments(moments: Iterable[tuple[float, int, T]], most: int) -> list[T]:
+    """Return up to ``most`` moments, of a badness and a stamp, ns, each, ``GAP_S`` or more apart.
+
+    The worst one comes first, and the earlier one of equal ones.
+    """
+    found = list[tuple[float, int, T]]()
+    for one in sorted(moments, key=lambda one: (-one[0], one[1])):
+        if len(found) < most and all(abs(one[1] - other[1]) >= 1e9 * GAP_S for other in found):
+            found.append(one)
+    return [moment for *_, moment in found]
+
+
+def _moment(estimate: Estimate) -> tuple[float, str]:
+    """Return the chance that a posture is wrong, and what is doubtful."""
     states, chances = estimate.keypoint_states, estimate.keypoint_chances
     if states is None or chances is None:
-        return _Moment(1.0, time_s, estimate.state)
+        return 1.0, estimate.state
     doubtful = [
         KEYPOINT_NAMES[hand].replace("_", " ")
-        for hand in _HANDS
+        for hand in HANDS
         if states[hand] in (KeypointState.UNCERTAIN, KeypointState.LOST)
     ]
-    what = " and ".join(doubtful) or "whole posture"
-    return _Moment(float(np.max(chances)), time_s, what)
+    return float(np.max(chances)), " and ".join(doubtful) or "whole posture"

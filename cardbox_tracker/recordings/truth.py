@@ -15,14 +15,10 @@ from cardbox_tracker.camera.camera import level_to_optical
 from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import foreign, read_regular
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES
-
-SHOULDERS = (0, 3)
-"""Their places among the keypoints."""
+from cardbox_tracker.person.skeleton import JOINT_NAMES, KEYPOINT_NAMES, SHOULDERS
 
 # A person who is about to move still stands where the recording began in this many frames.
 _FIRST_FRAMES = 10
-_MOST_BYTES = 256 * 1024 * 1024
 
 
 @dataclass(frozen=True)
@@ -67,7 +63,7 @@ def load_ground_truth(path: str | os.PathLike[str], camera: str | None = None) -
     """
     expected = "the ground_truth.json of a session, such as 'cardbox synthesize' writes"
     with foreign(path, CardboxError, expected):
-        data = json.loads(read_regular(path, _MOST_BYTES))
+        data = json.loads(read_regular(path))
         if camera is not None:
             data = _seen_by(data, camera)
         frames = {}

@@ -26,10 +26,9 @@ class RatedStates:
         keypoints_m: the same in the optical frame, (N, 6, 3), metres.
     """
 
-    def __init__(self, cost: MultiViewCost, expected: int = _USUAL) -> None:
-        """Start without states; ``expected`` of them, at least one, need no further memory."""
+    def __init__(self, cost: MultiViewCost) -> None:
         self._cost = cost
-        self._storage = [np.empty((expected, *shape)) for shape in _SHAPES]
+        self._storage = [np.empty((_USUAL, *shape)) for shape in _SHAPES]
         self._use(0)
 
     def _use(self, count: int) -> None:

@@ -15,6 +15,7 @@ from cardbox_tracker.camera.camera import NEAREST_M
 from cardbox_tracker.common.compiling import inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import keypoints
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.person.skeleton import SHOULDERS
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, TRUNK_PATCHES, corners_of_body
 from cardbox_tracker.terms.kernel_arguments import BodyTuple, body_of
 from cardbox_tracker.terms.multi_view import MultiViewCost
@@ -31,8 +32,6 @@ LEAST_IN_IMAGE = 0.6
 """Part of trunk and head in the image below which a posture is uncertain."""
 BEHIND_M = 0.08
 """Distance behind the middle plane of the trunk from which the trunk hides a keypoint, m."""
-
-_SHOULDERS = (0, 3)
 
 
 def is_trackable(cost: MultiViewCost, state: FloatArray) -> bool:
@@ -64,7 +63,7 @@ def _sees_enough(state: FloatArray, body: BodyTuple, size: tuple[int, int]) -> b
     """Return whether a camera with an image of ``size``, px, sees enough of a state (14,)."""
     points_m, corners_m = np.empty((6, 3)), np.empty((BODY_PATCHES, 4, 3))
     keypoints(state, body_of(body), points_m)
-    left, right = _SHOULDERS
+    left, right = SHOULDERS
     ahead_m = 0.5 * (points_m[left, 2] + points_m[right, 2])
     if ahead_m < NEAREST_TRACKED_M:
         return False
@@ -93,7 +92,7 @@ def _hide_fewer(
     lens = body_of(body).camera[:4]
     for number in range(len(points_m)):
         is_seen = _is_in_image(points_m[number], lens, size)
-        if is_seen and number not in _SHOULDERS:
+        if is_seen and number not in SHOULDERS:
             for patch in range(TRUNK_PATCHES):
                 is_seen &= not _is_behind(points_m[number], corners_m[patch], lens)
         hidden[number] &= not is_seen

@@ -30,7 +30,7 @@ from cardbox_tracker.segmentation.chroma import DARKEST, ChromaScore, colors_of
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
 from cardbox_tracker.segmentation.light import LEAST_LEVEL, LightFollower
 from cardbox_tracker.segmentation.partial_scene import merged
-from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, SQUARE, clean_in_window
+from cardbox_tracker.segmentation.regions import LEAST_AREA, MOST_HOLE, SQUARE, clean_silhouette
 from cardbox_tracker.segmentation.shadows import decide_shadows
 from cardbox_tracker.segmentation.window import Window, window_of
 
@@ -190,7 +190,7 @@ class SilhouetteExtractor:
             near = self._near(window, foreground.shape)
         self._decide(foreground, near, colors_of(image) if has_color else None)
         window = near or window_of(foreground).grown(_MARGIN_PX, foreground.shape)
-        silhouette, self._last = clean_in_window(foreground, LEAST_AREA, MOST_HOLE, window)
+        silhouette, self._last = clean_silhouette(foreground, LEAST_AREA, MOST_HOLE, window)
         if self._light is not None:
             self._light.exclude(silhouette, self._last)
         self._absorb(image, brightness, silhouette, stamp_ns)

@@ -40,8 +40,6 @@ _NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
 _COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
 # Longest list of numbers of an entry, and bytes of a number; a text may have as many bytes.
 _MOST_NUMBERS, _LARGEST_NUMBER = 32, 8
-# A background of 4096x4096, the largest working size, has 235 MB.
-_MOST_BYTES = 256 * 1024 * 1024
 _MAGIC, _HEADER = b"\x93NUMPY\x01\x00", struct.Struct("<8sH")
 _WRITTEN = re.compile(
     r"\{'descr': '(?P<kind><(?:[if][48]|U\d{1,6}))', 'fortran_order': (?P<order>True|False), "
@@ -107,7 +105,7 @@ def load_background(path: str | os.PathLike[str], most: tuple[int, int]) -> Stor
         "give another name, and let the node learn with nobody in view"
     )
     with foreign(path, BackgroundFileError, expected):
-        with regular_file(path, _MOST_BYTES) as file:
+        with regular_file(path) as file:
             arrays = _read(file, 2 * most[0] * most[1])
         return _checked(arrays, most)
 

@@ -51,21 +51,12 @@ class Regions(NamedTuple):
 
 def clean_silhouette(
     foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
-) -> ImageArray:
-    """Return a binary image (H, W), 0 or 255, without small specks and holes.
+) -> tuple[ImageArray, Window]:
+    """Return a binary image (H, W), 0 or 255, without small specks and holes, and its window.
 
     ``min_area`` and ``max_hole`` are fractions of the image; ``window`` contains all foreground.
-    Raises ValueError if the image is of another type or layout.
-    """
-    return clean_in_window(foreground, min_area, max_hole, window)[0]
-
-
-def clean_in_window(
-    foreground: ImageArray, min_area: float, max_hole: float, window: Window | None = None
-) -> tuple[ImageArray, Window]:
-    """Return what :func:`clean_silhouette` does, and the window of its foreground.
-
-    The window's columns are multiples of 8 if the image's width and the given window's are.
+    The columns of the window of what is left are multiples of 8 if the image's width and the given
+    window's are. Raises ValueError if the image is of another type or layout.
     """
     check_array("foreground", foreground, (ANY, ANY))
     silhouette = np.zeros(foreground.shape, np.uint8)

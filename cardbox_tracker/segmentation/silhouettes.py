@@ -157,4 +157,4 @@ def silhouette_within(depth_m: DepthImage, within_m: float) -> NDArray[np.uint8]
     width = max(3, round(_GAP * depth_m.shape[1]) | 1)
     closed = cv2.morphologyEx(near, cv2.MORPH_CLOSE, np.ones((width, width), np.uint8))
     near[~is_known & (np.asarray(closed) > 0)] = 255
-    return clean_silhouette(near, LEAST_AREA, MOST_HOLE)
+    return clean_silhouette(near, LEAST_AREA, MOST_HOLE)[0]

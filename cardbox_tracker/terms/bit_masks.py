@@ -5,12 +5,17 @@ No step depends on the order of the patches in a row.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
+from cardbox_tracker.common.compiling import (
+    borrowing_kernel,
+    index,
+    inlined_allocation,
+    inlined_kernel,
+)
 from cardbox_tracker.terms.bit_planes import (
     COUNTED,
     FOREGROUND,
@@ -27,9 +32,6 @@ from cardbox_tracker.terms.rasterisation import Workspace
 # Rounding moves a crossing by far less than this beyond the corners of its patch, px.
 _MARGIN_PX = 1.0
 
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
-_Index = int | np.integer[Any]
 Drawn = NDArray[np.uint32]
 
 _padded = inlined_kernel(padded)
@@ -60,40 +62,40 @@ def _place(work: Workspace, has_cuts: bool, width: int, masks: Masks) -> None:
     pixels, extent = work.pixels, work.extent
     drawn, words_of, rows_of = masks.drawn, masks.words_of, masks.rows_of
     patches, words = extent.shape[0], drawn.shape[0]
-    for w in range(_index(words)):
+    for w in range(index(words)):
         rows_of[w, 0], rows_of[w, 1] = drawn.shape[1], 0
-    for k in range(_index(patches)):
+    for k in range(index(patches)):
         first, last = extent[k, 0], extent[k, 1]
         left, right = 0.0, float(width)
         # Corners behind the near plane have no place in the image.
         if not has_cuts:
-            a, b = pixels[0, k], pixels[0, k + _index(patches)]
-            c, d = pixels[0, k + _index(2 * patches)], pixels[0, k + _index(3 * patches)]
+            a, b = pixels[0, k], pixels[0, k + index(patches)]
+            c, d = pixels[0, k + index(2 * patches)], pixels[0, k + index(3 * patches)]
             left = max(left, min(min(a, b), min(c, d)) - _MARGIN_PX)
             right = min(right, max(max(a, b), max(c, d)) + _MARGIN_PX)
         begin = end = 0
         if first < last and left < right:
             begin, end = int(left / PIXELS), min(int(right / PIXELS) + 1, words)
         words_of[k, 0], words_of[k, 1] = begin, end
-        for w in range(_index(begin), _index(end)):
+        for w in range(index(begin), index(end)):
             rows_of[w, 0], rows_of[w, 1] = min(rows_of[w, 0], first), max(rows_of[w, 1], last)
-    for w in range(_index(words)):
-        for v in range(_index(rows_of[w, 0]), _index(rows_of[w, 1])):
+    for w in range(index(words)):
+        for v in range(index(rows_of[w, 0]), index(rows_of[w, 1])):
             drawn[w, v] = np.uint32(0)
 
 
 @borrowing_kernel
 def _add(sides: Whole, extent: Counts, words_of: Counts, drawn: Drawn) -> None:
     """Add all patches with their ``extent`` (K, 2) and columns of words (K, 2)."""
-    for k in range(_index(extent.shape[0])):
+    for k in range(index(extent.shape[0])):
         first, count = np.int32(extent[k, 0]), np.uint32(extent[k, 1] - extent[k, 0])
         begin, end = extent[k, 0] // ROWS, _padded(extent[k, 1]) // ROWS
-        for w in range(_index(words_of[k, 0]), _index(words_of[k, 1])):
+        for w in range(index(words_of[k, 0]), index(words_of[k, 1])):
             column = np.int32(PIXELS) * np.int32(w)
-            for group in range(_index(begin), _index(end)):
+            for group in range(index(begin), index(end)):
                 # A constant number of rows is vectorized without a remainder.
                 for i in range(ROWS):
-                    v = group * _index(ROWS) + _index(i)
+                    v = group * index(ROWS) + index(i)
                     one = left_of(sides[k, 0, v], column)
                     other = left_of(sides[k, 1, v], column)
                     # The sides are in any order, and those of other rows are undefined.
@@ -106,9 +108,9 @@ def _add(sides: Whole, extent: Counts, words_of: Counts, drawn: Drawn) -> None:
 def _count(drawn: Drawn, rows_of: Counts, planes: Planes) -> tuple[int, int]:
     """Return drawn pixels and their sum of (1 - 2 f)."""
     pixels = gain = 0
-    for w in range(_index(drawn.shape[0])):
+    for w in range(index(drawn.shape[0])):
         area, counted, seen = np.int32(0), np.int32(0), np.int32(0)
-        for v in range(_index(rows_of[w, 0]), _index(rows_of[w, 1])):
+        for v in range(index(rows_of[w, 0]), index(rows_of[w, 1])):
             word = drawn[w, v]
             area = np.int32(area + count_bits(word))
             counted = np.int32(counted + count_bits(np.uint32(word & planes[COUNTED, w, v])))
@@ -138,10 +140,10 @@ def sum_masks(
 def cover_masks(masks: Masks, planes: Planes, covered: Planes) -> None:
     """Write the planes to ``covered`` without the pixels of the last union."""
     drawn, rows_of = masks.drawn, masks.rows_of
-    for w in range(_index(drawn.shape[0])):
-        for v in range(_index(drawn.shape[1])):
+    for w in range(index(drawn.shape[0])):
+        for v in range(index(drawn.shape[1])):
             covered[COUNTED, w, v] = planes[COUNTED, w, v]
             covered[FOREGROUND, w, v] = planes[FOREGROUND, w, v]
-        for v in range(_index(rows_of[w, 0]), _index(rows_of[w, 1])):
+        for v in range(index(rows_of[w, 0]), index(rows_of[w, 1])):
             covered[COUNTED, w, v] &= ~drawn[w, v]
             covered[FOREGROUND, w, v] &= ~drawn[w, v]

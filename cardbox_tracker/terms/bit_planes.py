@@ -15,7 +15,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import Index, index, inlined_kernel, kernel
 from cardbox_tracker.segmentation.regions import LOW_BITS
 
 Planes = NDArray[np.uint32]
@@ -27,10 +27,6 @@ PIXELS, ROWS = 31, 16
 """Pixels of a word, and rows of a group."""
 _LOW_BYTES = np.uint64(0x7F7F7F7F7F7F7F7F)
 _GATHER = np.uint64(0x0102040810204080)
-
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
-_Index = int | np.integer[Any]
 
 
 def _low_bits(typing_context: Any, count: Any) -> Any:
@@ -78,7 +74,7 @@ def left_of(column: np.int32, begin: np.int32) -> np.uint32:
 def _eight_bits(pixels: np.uint64) -> np.uint64:
     """Return one bit for each byte, 1 if it is not zero; the first pixel's is the lowest."""
     is_set = ((pixels & _LOW_BYTES) + _LOW_BYTES) | pixels
-    bits: np.uint64 = (((is_set >> _index(7)) & LOW_BITS) * _GATHER) >> _index(56)
+    bits: np.uint64 = (((is_set >> index(7)) & LOW_BITS) * _GATHER) >> index(56)
     return bits
 
 
@@ -92,30 +88,30 @@ def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes
     """
     rows, width = silhouette.shape
     last = planes.shape[1] - 1
-    for column in range(_index(last + 1)):
-        pixels = below(np.int32(PIXELS if column < _index(last) else width - PIXELS * last))
-        for v in range(_index(rows)):
+    for column in range(index(last + 1)):
+        pixels = below(np.int32(PIXELS if column < index(last) else width - PIXELS * last))
+        for v in range(index(rows)):
             planes[COUNTED, column, v] = pixels
     # Eight pixels of a row in each number; a word is a part of five numbers.
     eights = np.zeros((width + 7) // 8 + 5, np.uint64)
     total = 0
-    for v in range(_index(rows)):
-        for i in range(_index(words.shape[1])):
+    for v in range(index(rows)):
+        for i in range(index(words.shape[1])):
             eights[i] = _eight_bits(words[v, i])
         if words.shape[1] == 0:
             eights[:] = 0
-            for u in range(_index(width)):
-                bit = _index(silhouette[v, u] != 0) << (u & _index(7))
-                eights[u >> _index(3)] |= bit
-        for w in range(_index(last + 1)):
-            first = w * _index(PIXELS)
-            at = first >> _index(3)
-            five = eights[at] | eights[at + _index(1)] << _index(8)
-            five |= eights[at + _index(2)] << _index(16) | eights[at + _index(3)] << _index(24)
-            five |= eights[at + _index(4)] << _index(32)
-            planes[FOREGROUND, w, v] = (five >> (first & _index(7))) & _index(2**PIXELS - 1)
-    for column in range(_index(last + 1)):
-        for v in range(_index(rows)):
+            for u in range(index(width)):
+                bit = index(silhouette[v, u] != 0) << (u & index(7))
+                eights[u >> index(3)] |= bit
+        for w in range(index(last + 1)):
+            first = w * index(PIXELS)
+            at = first >> index(3)
+            five = eights[at] | eights[at + index(1)] << index(8)
+            five |= eights[at + index(2)] << index(16) | eights[at + index(3)] << index(24)
+            five |= eights[at + index(4)] << index(32)
+            planes[FOREGROUND, w, v] = (five >> (first & index(7))) & index(2**PIXELS - 1)
+    for column in range(index(last + 1)):
+        for v in range(index(rows)):
             total += count_bits(planes[FOREGROUND, column, v])
     return total
 
@@ -124,11 +120,11 @@ def fill_planes(silhouette: NDArray[np.uint8], words: NDArray[np.uint64], planes
 def leave_out(planes: Planes, first_row: int, end_row: int, start: int, end: int) -> int:
     """Let these rows and columns, those of legs, no longer count; return their foreground, px."""
     taken = 0
-    for w in range(_index(planes.shape[1])):
+    for w in range(index(planes.shape[1])):
         column = np.int32(PIXELS) * np.int32(w)
         within = np.uint32(left_of(np.int32(start), column) ^ left_of(np.int32(end), column))
         if within:
-            for v in range(_index(first_row), _index(end_row)):
+            for v in range(index(first_row), index(end_row)):
                 taken += count_bits(np.uint32(planes[FOREGROUND, w, v] & within))
                 planes[COUNTED, w, v] &= ~within
                 planes[FOREGROUND, w, v] &= ~within
@@ -136,11 +132,11 @@ def leave_out(planes: Planes, first_row: int, end_row: int, start: int, end: int
 
 
 @inlined_kernel
-def value_at(planes: Planes, v: _Index, u: _Index) -> int:
+def value_at(planes: Planes, v: Index, u: Index) -> int:
     """Return 1 - 2 f of the pixel in row ``v`` and column ``u``; 0 if it does not count."""
-    w, bit = _index(u) // _index(PIXELS), np.uint32(_index(u) % _index(PIXELS))
-    counted = (planes[COUNTED, w, _index(v)] >> bit) & np.uint32(1)
-    seen = (planes[FOREGROUND, w, _index(v)] >> bit) & np.uint32(1)
+    w, bit = index(u) // index(PIXELS), np.uint32(index(u) % index(PIXELS))
+    counted = (planes[COUNTED, w, index(v)] >> bit) & np.uint32(1)
+    seen = (planes[FOREGROUND, w, index(v)] >> bit) & np.uint32(1)
     return int(counted) - 2 * int(seen)
 
 
@@ -156,14 +152,14 @@ def median_column(planes: Planes, rows: int, width: int) -> float:
             following = planes[FOREGROUND, min(w + 1, words - 1), v]
             if planes[FOREGROUND, w, v] == 0 and following == 0:
                 continue
-            pair = _index(planes[FOREGROUND, w, v]) | _index(following) << _index(PIXELS)
+            pair = index(planes[FOREGROUND, w, v]) | index(following) << index(PIXELS)
             both = planes[COUNTED, w, v], planes[COUNTED, min(w + 1, words - 1), v]
-            counted = _index(both[0]) | _index(both[1]) << _index(PIXELS)
+            counted = index(both[0]) | index(both[1]) << index(PIXELS)
             begin, end = (PIXELS * w + 3) // 4, (PIXELS * (w + 1) + 3) // 4
             for i in range(begin, min(end, width // 4)):
-                shift = _index(4 * i - PIXELS * w)
-                four = count_bits(np.uint32((counted >> shift) & _index(15)))
-                if 2 * count_bits(np.uint32((pair >> shift) & _index(15))) > four:
+                shift = index(4 * i - PIXELS * w)
+                four = count_bits(np.uint32((counted >> shift) & index(15)))
+                if 2 * count_bits(np.uint32((pair >> shift) & index(15))) > four:
                     counts[i] += 1
                     total += 1
     seen = 0

@@ -12,9 +12,7 @@ an arm particle draws only its own 4 patches instead of 11.
 
 from __future__ import annotations
 
-import numpy as np
-
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import index, inlined_kernel, kernel
 from cardbox_tracker.person.kinematics import angles_in, side_of, torso_pose, turn_limb
 from cardbox_tracker.person.parts import (
     BOTTOM,
@@ -49,8 +47,6 @@ TRUNK_PATCHES = 8
 ARM_PATCHES = 4
 _BODY_PATCHES = TRUNK_PATCHES + 2 * ARM_PATCHES
 Size = tuple[int, int]
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
 
 
 @inlined_kernel
@@ -120,8 +116,8 @@ def _place(
         for corner in range(4):
             at = corner * patches
             for e in range(at + first, at + end):
-                x, y, z = shape[0, _index(e)], shape[1, _index(e)], shape[2, _index(e)]
-                corners[j, _index(e)] = o + a * x + b * y + c * z
+                x, y, z = shape[0, index(e)], shape[1, index(e)], shape[2, index(e)]
+                corners[j, index(e)] = o + a * x + b * y + c * z
 
 
 @inlined_kernel

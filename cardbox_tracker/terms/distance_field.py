@@ -12,10 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import kernel
+from cardbox_tracker.common.compiling import index, kernel
 
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
 FAR = 10
 """Limit of the distances, px."""
 # Columns that a loop processes at once; a constant number leaves no rest for slower code.
@@ -41,11 +39,11 @@ def signed_distances_of(mask: NDArray[np.uint8], distances: NDArray[np.float32])
         # Assignments to slices take longer than loops.
         row, padded = mask[v], sides[v]
         for u in range(FAR):
-            padded[_index(u)] = row[0]
+            padded[index(u)] = row[0]
         for u in range(width):
-            padded[_index(u + FAR)] = row[_index(u)]
+            padded[index(u + FAR)] = row[index(u)]
         for u in range(FAR + width, padded.shape[0]):
-            padded[_index(u)] = row[_index(width - 1)]
+            padded[index(u)] = row[index(width - 1)]
     columns = np.empty(distances.shape, np.uint8)
     _along_columns(sides, columns)
     _along_rows(sides, columns, distances)
@@ -66,19 +64,19 @@ def _along_columns(mask: NDArray[np.uint8], distances: NDArray[np.uint8]) -> Non
             here, inside = distances[v, first:end], mask[v, first:end]
             above = mask[v - 1, first:end]
             for u in range(_LANES):
-                farther = np.uint8(last[_index(u)] + one)
+                farther = np.uint8(last[index(u)] + one)
                 farther = farther if farther < far else far
-                farther = farther if inside[_index(u)] == above[_index(u)] else one
-                last[_index(u)], here[_index(u)] = farther, farther
+                farther = farther if inside[index(u)] == above[index(u)] else one
+                last[index(u)], here[index(u)] = farther, farther
         for v in range(height - 2, -1, -1):
             here, inside = distances[v, first:end], mask[v, first:end]
             below = mask[v + 1, first:end]
             for u in range(_LANES):
-                farther = np.uint8(last[_index(u)] + one)
-                farther = farther if inside[_index(u)] == below[_index(u)] else one
-                now = here[_index(u)]
+                farther = np.uint8(last[index(u)] + one)
+                farther = farther if inside[index(u)] == below[index(u)] else one
+                now = here[index(u)]
                 farther = farther if farther < now else now
-                last[_index(u)], here[_index(u)] = farther, farther
+                last[index(u)], here[index(u)] = farther, farther
 
 
 @kernel
@@ -95,17 +93,17 @@ def _along_rows(
         column, inside, row = columns[v], mask[v], distances[v]
         for first in range(0, width, _LANES):
             for u in range(first, first + _LANES):
-                square = np.uint8(column[_index(u)] * column[_index(u)])
-                is_inside = inside[_index(u)] != 0
-                inner[_index(u + FAR)] = square if is_inside else none
-                outer[_index(u + FAR)] = none if is_inside else square
+                square = np.uint8(column[index(u)] * column[index(u)])
+                is_inside = inside[index(u)] != 0
+                inner[index(u + FAR)] = square if is_inside else none
+                outer[index(u + FAR)] = none if is_inside else square
         _least_along_row(inner, least_inner)
         _least_along_row(outer, least_outer)
         for first in range(0, width, _LANES):
             for u in range(first, first + _LANES):
-                signed = np.int32(least_outer[_index(u)]) - np.int32(least_inner[_index(u)])
+                signed = np.int32(least_outer[index(u)]) - np.int32(least_inner[index(u)])
                 square_px = np.float32(signed)
-                row[_index(u)] = np.copysign(np.sqrt(abs(square_px)), square_px)
+                row[index(u)] = np.copysign(np.sqrt(abs(square_px)), square_px)
 
 
 @kernel
@@ -113,11 +111,11 @@ def _least_along_row(squares: NDArray[np.uint8], least: NDArray[np.uint8]) -> No
     """Write the least of k^2 + ``squares`` (W + 2 ``FAR``,) at k pixels aside, (W,)."""
     for first in range(0, len(least), _LANES):
         for u in range(first, first + _LANES):
-            now = squares[_index(u + FAR)]
+            now = squares[index(u + FAR)]
             # The compiler unrolls this loop and vectorizes the outer one.
             for k in range(1, FAR):
-                one_way, other_way = squares[_index(u + FAR - k)], squares[_index(u + FAR + k)]
+                one_way, other_way = squares[index(u + FAR - k)], squares[index(u + FAR + k)]
                 nearer = one_way if one_way < other_way else other_way
                 nearer = np.uint8(nearer + np.uint8(k * k))
                 now = nearer if nearer < now else now
-            least[_index(u)] = now
+            least[index(u)] = now

@@ -7,14 +7,12 @@ from math import hypot
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.common.compiling import inlined_kernel, kernel
+from cardbox_tracker.common.compiling import index, inlined_kernel, kernel
 from cardbox_tracker.terms.body_outline import BODY_PATCHES
 from cardbox_tracker.terms.kernel_arguments import Floats
 
 Ints = NDArray[np.int64]
 
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
 # Points on each edge of a patch.
 _ON_EDGE = 6
 POINTS = BODY_PATCHES * 4 * _ON_EDGE
@@ -41,7 +39,7 @@ def project_corners(corners_m: Floats, lens: Floats, corners_px: Floats) -> None
 @inlined_kernel
 def point_on_edge(corners_px: Floats, p: int, c: int, share: float) -> tuple[float, float, float]:
     """Return column, row and inverse depth at a fraction of the edge from corner ``c``."""
-    begin, end = corners_px[_index(p), _index(c)], corners_px[_index(p), _index((c + 1) & 3)]
+    begin, end = corners_px[index(p), index(c)], corners_px[index(p), index((c + 1) & 3)]
     x, y, inverse = begin[0], begin[1], begin[2]
     return (
         x + share * (end[0] - x),
@@ -163,9 +161,9 @@ def distance_at(field: NDArray[np.float32], x: float, y: float) -> float:
     y = min(max(0.0, y), height - 1.001)
     u, v = int(x), int(y)
     a, b = x - u, y - v
-    above, below = field[_index(v)], field[_index(v + 1)]
-    upper, lower = above[_index(u)], below[_index(u)]
-    upper += a * (above[_index(u + 1)] - upper)
-    lower += a * (below[_index(u + 1)] - lower)
+    above, below = field[index(v)], field[index(v + 1)]
+    upper, lower = above[index(u)], below[index(u)]
+    upper += a * (above[index(u + 1)] - upper)
+    lower += a * (below[index(u + 1)] - lower)
     distance: float = upper + b * (lower - upper)
     return distance

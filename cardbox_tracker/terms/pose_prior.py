@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from cardbox_tracker.common.compiling import inlined_kernel
+from cardbox_tracker.common.compiling import index, inlined_kernel
 from cardbox_tracker.person.sizes import FloatArray
 
 FLOOR_NATS = 8.0
@@ -27,8 +27,6 @@ FLOOR_NATS = 8.0
 can still outweigh it."""
 
 _DATA = "pose_prior.json"
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
 
 
 @cache
@@ -57,10 +55,10 @@ def load_gmm() -> FloatArray:
     return gmm
 
 
-def sample_bank(count: int = 3000, seed: int = 0) -> FloatArray:
-    """Sample arms from the mixture: unit vectors of upper arm and forearm, (count, 6)."""
-    data = _data()
-    rng = np.random.default_rng(seed)
+def sample_bank() -> FloatArray:
+    """Sample arms from the mixture: unit vectors of upper arm and forearm, (3000, 6)."""
+    data, count = _data(), 3000
+    rng = np.random.default_rng(0)
     shares = np.array(data["shares"])
     chosen = rng.choice(len(shares), count, p=shares / shares.sum())
     means = np.array(data["means"])
@@ -86,7 +84,7 @@ def nats_of(directions: Any, gaussians: Any, rest: float, logs: Any) -> float:
     d0, d1, d2 = directions[0], directions[1], directions[2]
     d3, d4, d5 = directions[3], directions[4], directions[5]
     for one in range(g.shape[1]):
-        k = _index(one)
+        k = index(one)
         x0, x1, x2 = d0 - g[1, k], d1 - g[2, k], d2 - g[3, k]
         x3, x4, x5 = d3 - g[4, k], d4 - g[5, k], d5 - g[6, k]
         y = g[7, k] * x0

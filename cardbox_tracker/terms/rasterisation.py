@@ -10,12 +10,18 @@ around it, or the edge from that corner to the next.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from cardbox_tracker.camera.rasterisation import CROSSING_BITS, FARTHEST_PX, NEAR_PLANE_M, SUBPIXELS
-from cardbox_tracker.common.compiling import borrowing_kernel, inlined_allocation, inlined_kernel
+from cardbox_tracker.common.compiling import (
+    Index,
+    borrowing_kernel,
+    index,
+    inlined_allocation,
+    inlined_kernel,
+)
 from cardbox_tracker.terms.kernel_arguments import Counts, Floats, Intrinsics, Whole
 
 _ONE = float(2**CROSSING_BITS)
@@ -24,9 +30,6 @@ _ROUND_UP = 2**CROSSING_BITS - 1
 # Largest step of an edge; a flatter edge meets at most one row, and its step is not used.
 _STEEPEST = 32000.0
 
-# With an unsigned index, numba compiles no code for negative indices.
-_index = np.uint64
-_Index = int | np.integer[Any]
 # Rows of the array of edges.
 _FIRST_ROW, _END_ROW, _CROSSING, _STEP = 0, 1, 2, 3
 
@@ -113,22 +116,22 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> bool:
     patches = extent.shape[0]
     behind = 0
     for e in range(4 * patches):
-        z = corners[2, _index(e)]
+        z = corners[2, index(e)]
         behind += z < NEAR_PLANE_M
         nearness = 1.0 / z
-        pixels[0, _index(e)] = _snap(fx * corners[0, _index(e)] * nearness + cx)
-        pixels[1, _index(e)] = _snap(fy * corners[1, _index(e)] * nearness + cy)
+        pixels[0, index(e)] = _snap(fx * corners[0, index(e)] * nearness + cx)
+        pixels[1, index(e)] = _snap(fy * corners[1, index(e)] * nearness + cy)
     if behind > 0:
         for p in range(patches):
             _draw_cut(work, p, camera, rows, width)
         return True
     limit = float(rows)
     for p in range(patches):
-        pixels[0, _index(4 * patches + p)] = pixels[0, _index(p)]
-        pixels[1, _index(4 * patches + p)] = pixels[1, _index(p)]
+        pixels[0, index(4 * patches + p)] = pixels[0, index(p)]
+        pixels[1, index(4 * patches + p)] = pixels[1, index(p)]
     for e in range(4 * patches):
-        x0, x1 = pixels[0, _index(e)], pixels[0, _index(e + patches)]
-        y0, y1 = pixels[1, _index(e)], pixels[1, _index(e + patches)]
+        x0, x1 = pixels[0, index(e)], pixels[0, index(e + patches)]
+        y0, y1 = pixels[1, index(e)], pixels[1, index(e + patches)]
         slope = (x1 - x0) / (1.0 if y0 == y1 else y1 - y0)
         upper_x = x0 if y0 < y1 else x1
         upper_y = min(y0, y1)
@@ -136,37 +139,37 @@ def draw(work: Workspace, camera: Intrinsics, rows: int, width: int) -> bool:
         # A level edge meets no row; its crossing only has to be finite.
         crossing = upper_x + (0.0 if y0 == y1 else (row - upper_y) * slope)
         step = min(max(slope, -_STEEPEST), _STEEPEST)
-        edges[_FIRST_ROW, _index(e)] = np.int32(row)
-        edges[_END_ROW, _index(e)] = np.int32(_row(max(y0, y1), limit))
-        edges[_CROSSING, _index(e)] = np.int32(np.floor(crossing * _ONE + 0.5))
-        edges[_STEP, _index(e)] = np.int32(np.floor(step * _ONE + 0.5))
+        edges[_FIRST_ROW, index(e)] = np.int32(row)
+        edges[_END_ROW, index(e)] = np.int32(_row(max(y0, y1), limit))
+        edges[_CROSSING, index(e)] = np.int32(np.floor(crossing * _ONE + 0.5))
+        edges[_STEP, index(e)] = np.int32(np.floor(step * _ONE + 0.5))
     for p in range(patches):
         # Downward edges write one side of their rows, upward edges the other. Each row gets both
         # sides once, unless rounding makes a thin patch concave.
-        y0, y1 = pixels[1, _index(p)], pixels[1, _index(p + patches)]
-        y2, y3 = pixels[1, _index(p + 2 * patches)], pixels[1, _index(p + 3 * patches)]
+        y0, y1 = pixels[1, index(p)], pixels[1, index(p + patches)]
+        y2, y3 = pixels[1, index(p + 2 * patches)], pixels[1, index(p + 3 * patches)]
         a, b, c, d = y1 > y0, y2 > y1, y3 > y2, y0 > y3
         if (a != b) + (b != c) + (c != d) + (d != a) > 2:
             _draw_cut(work, p, camera, rows, width)
             continue
         extent[p, 0] = np.int64(_row(min(min(y0, y1), min(y2, y3)), limit))
         extent[p, 1] = np.int64(_row(max(max(y0, y1), max(y2, y3)), limit))
-        _cross(edges, p, p, _index(a), work.sides, width)
-        _cross(edges, p + patches, p, _index(b), work.sides, width)
-        _cross(edges, p + 2 * patches, p, _index(c), work.sides, width)
-        _cross(edges, p + 3 * patches, p, _index(d), work.sides, width)
+        _cross(edges, p, p, index(a), work.sides, width)
+        _cross(edges, p + patches, p, index(b), work.sides, width)
+        _cross(edges, p + 2 * patches, p, index(c), work.sides, width)
+        _cross(edges, p + 3 * patches, p, index(d), work.sides, width)
     return False
 
 
 @inlined_kernel
-def _cross(edges: Whole, e: int, p: int, side: _Index, sides: Whole, width: int) -> None:
+def _cross(edges: Whole, e: int, p: int, side: Index, sides: Whole, width: int) -> None:
     """Write the columns where edge ``e`` crosses its rows, as one side of patch ``p``."""
-    first = np.int64(edges[_FIRST_ROW, _index(e)])
-    x, step, limit = edges[_CROSSING, _index(e)], edges[_STEP, _index(e)], np.int32(width)
-    base, k = _index(first), _index(p)
-    for i in range(np.int64(edges[_END_ROW, _index(e)]) - first):
+    first = np.int64(edges[_FIRST_ROW, index(e)])
+    x, step, limit = edges[_CROSSING, index(e)], edges[_STEP, index(e)], np.int32(width)
+    base, k = index(first), index(p)
+    for i in range(np.int64(edges[_END_ROW, index(e)]) - first):
         u = np.int32(np.int32(x + np.int32(i) * step + np.int32(_ROUND_UP)) >> _BITS)
-        sides[k, side, base + _index(i)] = min(max(u, np.int32(0)), limit)
+        sides[k, side, base + index(i)] = min(max(u, np.int32(0)), limit)
 
 
 @borrowing_kernel

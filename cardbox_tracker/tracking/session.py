@@ -190,7 +190,11 @@ class _Person:
 
 
 class Session:
-    """Tracks up to six people before up to four cameras, by default with the preset ``default``."""
+    """Tracks up to six people before up to four cameras, by default with the preset ``default``.
+
+    Attributes:
+        is_several: whether estimates are of several people, each with a number.
+    """
 
     def __init__(
         self,
@@ -240,7 +244,7 @@ class Session:
         self._look, self._is_alone, self._beside = look, people is None, beside
         self._only_measures, self._most = only_measures, people or MOST_PEOPLE
         self._scene = None if scene is None else of_kind("scene", scene, SceneWatch)
-        self._only = only
+        self._only, self.is_several = only, people is not None and only is None
         self._people: list[_Person] = []
         # What the first camera's last image shows of each person, by number.
         self._seen: dict[int, _Share] = {}

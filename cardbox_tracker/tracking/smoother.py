@@ -55,7 +55,7 @@ from cardbox_tracker.person.skeleton import (
     rows_of,
 )
 from cardbox_tracker.search.arm_search import ARM_LIMITS
-from cardbox_tracker.tracking.estimate import CONTRADICTED, FILLED, Estimate, Legs
+from cardbox_tracker.tracking.estimate import CONTRADICTED, FILLED, Estimate
 
 T = TypeVar("T")
 
@@ -81,9 +81,11 @@ _OF = np.concatenate([_OWN, _WITH])
 _BEGINS, _COUNTS = np.unique(_OWN, return_index=True, return_counts=True)[1:]
 _LIMB_GROUPS = slice(2, 6)
 _LIMBS = slice(_BEGINS[_LIMB_GROUPS.start], _BEGINS[_LIMB_GROUPS.stop])
-_PLACED, _NECK = slice(_LIMBS.stop), slice(_LIMBS.stop, _BEGINS[-1])
-_LEGS, _STDDEVS = slice(_NECK.stop, len(_OWN)), slice(len(_OWN), len(_OWN) + PLACE.stop)
+_PLACED, _STDDEVS = slice(_LIMBS.stop), slice(len(_OWN), len(_OWN) + PLACE.stop)
+_NECK, _LEGS = slice(_LIMBS.stop, _BEGINS[-1]), slice(_BEGINS[-1], len(_OWN))
 _LEG_POINTS = slice(_STDDEVS.stop, len(_OF))
+# The rows of the skeleton that are smoothed as they are, and their values.
+_FOLLOWING, _FOLLOWED = rows_of(Group.NECK, Group.LEG), slice(_NECK.start, _LEGS.stop)
 # The deviations that belong to place, trunk and each limb.
 _LASTING = [np.flatnonzero(_WITH[: PLACE.stop] == group) for group in range(6)]
 # What has rates: the joints of posture and place, the rises of the shoulders, then keypoints.
@@ -211,10 +213,8 @@ def _values(estimate: Estimate) -> FloatArray:
     found[: _LIMBS.stop] = np.concatenate([state[_PLACES], state[TURNS], *limbs])
     stddev = np.concatenate([estimate.posture_stddev, estimate.offset_stddev_m])
     found[_STDDEVS] = np.log(np.maximum(stddev, 1e-6))
-    if estimate.neck is not None:
-        found[_NECK] = estimate.neck
+    found[_FOLLOWED] = estimate.joints[0, _FOLLOWING]
     if estimate.legs is not None:
-        found[_LEGS] = estimate.legs.angles
         found[_LEG_POINTS] = estimate.legs.points_m.ravel()
     return found
 
@@ -365,20 +365,25 @@ def _states(values: FloatArray) -> FloatArray:
 def _estimate(result: _Result, smooth: Spline, image: int) -> Estimate:
     """Return the estimate of an image of a spline."""
     estimate, body = result.estimate, result.body
-    values, stddev = smooth.values[image], smooth.stddev[image]
+    values, stddev = smooth.values[image], smooth.stddev[image, _OF]
     state = _states(values[None, _PLACED])[0]
     before = estimate.placed_posture
     state[YAW] += 2.0 * np.pi * np.round((before[YAW] - state[YAW]) / (2.0 * np.pi))
-    deviations = np.hypot(np.exp(values[_STDDEVS]), stddev[_WITH[: PLACE.stop]])
+    deviations = np.hypot(np.exp(values[_STDDEVS]), stddev[_STDDEVS])
     posture, posture_stddev = state[:N_JOINTS], deviations[:N_JOINTS]
     pitch_rad = body.camera_pose.pitch_rad
     rises = clavicles(body, posture, posture_stddev)
-    legs = estimate.legs
+    # Only in a gap are neck and legs less sure than they were read.
+    more, legs, neck_stddev = stddev * (estimate.state == FILLED), estimate.legs, None
+    if estimate.neck_stddev is not None:
+        neck_stddev = np.hypot(estimate.neck_stddev, more[_NECK])
     if legs is not None:
-        points_m = values[_LEG_POINTS].reshape(-1, 3)
-        legs = legs._replace(angles=values[_LEGS], points_m=points_m)
-    if estimate.state == FILLED:
-        estimate, legs = _less_sure(estimate, legs, *stddev[_OF[[_NECK.start, _LEGS.start]]])
+        legs = legs._replace(
+            angles=values[_LEGS],
+            angles_stddev=np.hypot(legs.angles_stddev, more[_LEGS]),
+            points_m=values[_LEG_POINTS].reshape(-1, 3),
+            points_stddev_m=np.hypot(legs.points_stddev_m, more[_LEGS.start]),
+        )
     return replace(
         estimate,
         posture=posture,
@@ -389,22 +394,10 @@ def _estimate(result: _Result, smooth: Spline, image: int) -> Estimate:
         clavicles_m=rises[0],
         clavicles_stddev_m=rises[1],
         neck=None if estimate.neck is None else values[_NECK],
+        neck_stddev=neck_stddev,
         legs=legs,
         smoothed_hz=smooth.cutoff_hz,
     )
-
-
-def _less_sure(
-    estimate: Estimate, legs: Legs | None, neck_stddev: float, legs_stddev: float
-) -> tuple[Estimate, Legs | None]:
-    """Return the estimate of a gap and its legs with deviations that have grown."""
-    if legs is not None:
-        grown = np.hypot(legs.angles_stddev, legs_stddev)
-        points_m = np.hypot(legs.points_stddev_m, legs_stddev)
-        legs = legs._replace(angles_stddev=grown, points_stddev_m=points_m)
-    if estimate.neck_stddev is not None:
-        estimate = replace(estimate, neck_stddev=np.hypot(estimate.neck_stddev, neck_stddev))
-    return estimate, legs
 
 
 def _rates(results: Sequence[_Result], smooth: Spline, images: NDArray[np.intp]) -> FloatArray:
@@ -434,10 +427,7 @@ def _rates(results: Sequence[_Result], smooth: Spline, images: NDArray[np.intp])
     moved = carried(place, values[:, _PLACED], rates[..., _PLACED], _ARE_ANGLES)
     found = np.full((4, len(images), len(STATE_NAMES) + 3 * len(KEYPOINT_NAMES)), np.nan)
     found[..., _MOVED], found[..., len(STATE_NAMES) :] = np.split(moved, [len(_MOVED)], axis=2)
-    neck, legs = rows_of(Group.NECK), rows_of(Group.LEG)
-    found[..., neck], found[..., legs] = rates[..., _NECK], rates[..., _LEGS]
-    estimates = [result.estimate for result in results]
-    found[:, [one.neck is None for one in estimates], neck[:, None]] = np.nan
-    found[:, [one.legs is None for one in estimates], legs[:, None]] = np.nan
+    read = np.array([result.values[_FOLLOWED] for result in results])
+    found[..., _FOLLOWING] = np.where(np.isnan(read), np.nan, rates[..., _FOLLOWED])
     found[:, np.isnan(rates[0, :, 0])] = np.nan
     return found.transpose(1, 0, 2)

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts
-from cardbox_tracker.person.skeleton import JOINT_NAMES, KeypointState
-from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
+from cardbox_tracker.person.skeleton import JOINT_NAMES, SHOULDERS, KeypointState
+from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.search.doubt import FAR_M, HANDS
 from cardbox_tracker.tracking.estimate import TRACKING
 from lab.evaluation.angles import joint_angles

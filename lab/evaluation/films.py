@@ -29,10 +29,9 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.common.progress import progress_bar
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.skeleton import KeypointState
+from cardbox_tracker.person.skeleton import SHOULDERS, KeypointState
 from cardbox_tracker.recordings.open_images import open_images
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
-from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.tracking.estimate import Estimate
 from cardbox_tracker.tracking.precompile import compile_all

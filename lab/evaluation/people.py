@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
+from cardbox_tracker.person.skeleton import SHOULDERS
+from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.tracking.estimate import TRACKING
 from lab.evaluation.figures import figures
 from lab.evaluation.session import RecordedSession

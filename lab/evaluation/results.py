@@ -18,7 +18,6 @@ from cardbox_tracker.common.errors import CardboxError
 from cardbox_tracker.common.files import UnreadableFileError, read_regular, write_file
 
 _DIGITS = 6
-_MOST_BYTES = 256 * 1024 * 1024
 
 
 def provenance() -> dict[str, Any]:
@@ -78,7 +77,7 @@ def read_json(path: Path) -> dict[str, Any]:
         CardboxError: the file cannot be read or does not have results.
     """
     try:
-        data = json.loads(read_regular(path, _MOST_BYTES))
+        data = json.loads(read_regular(path))
     except UnreadableFileError as error:
         raise CardboxError(f"cannot read {path}: {error}") from None
     except (ValueError, RecursionError) as error:

@@ -27,10 +27,9 @@ from cardbox_tracker.commands.tracking_request import points_named
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.model import body_from_proportions
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import KEYPOINT_NAMES
+from cardbox_tracker.person.skeleton import KEYPOINT_NAMES, SHOULDERS
 from cardbox_tracker.recordings.recording import RecordingRequest, Segmentation
 from cardbox_tracker.recordings.silhouettes import TimeSpan
-from cardbox_tracker.recordings.truth import SHOULDERS
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate
 from cardbox_tracker.tracking.session import Session

@@ -36,8 +36,7 @@ from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.sizes import FloatArray
-from cardbox_tracker.person.skeleton import Group, rows_of
-from cardbox_tracker.recordings.truth import SHOULDERS
+from cardbox_tracker.person.skeleton import SHOULDERS, Group, rows_of
 from cardbox_tracker.search.config import PRESETS, TrackerConfig
 from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import Estimate

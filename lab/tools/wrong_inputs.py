@@ -18,8 +18,8 @@ import numpy as np
 
 from cardbox_tracker.common.files import write_file
 from cardbox_tracker.detectors.detector import Detector
-from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.recordings.truth import SHOULDERS, beside_shoulders
+from cardbox_tracker.person.skeleton import SHOULDERS, KeypointState
+from cardbox_tracker.recordings.truth import beside_shoulders
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.doubt import FAR_M
 from cardbox_tracker.tracking.estimate import TRACKING, Estimate

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 from tqdm import tqdm
 
+from cardbox_tracker.common import progress
 from cardbox_tracker.common.progress import progress_bar, told
 
 
@@ -48,7 +49,8 @@ def test_the_seconds_of_a_bar_go_on_while_nothing_is_finished(
 
     monkeypatch.setattr(tqdm, "refresh", seen)
     monkeypatch.setattr(sys.stderr, "isatty", lambda: True, raising=False)
-    with progress_bar("track", every_s=0.01):
+    monkeypatch.setattr(progress, "told", lambda say, text, _: told(say, text, 0.01))
+    with progress_bar("track"):
         assert all(drawn.acquire(timeout=30.0) for _ in range(3))
     assert "track:   0%" in capfd.readouterr().err
 

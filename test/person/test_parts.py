@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cardbox_tracker.person.cardbox import NECK_PATCHES, cardbox_patches, part_patches
+from cardbox_tracker.person.cardbox import cardbox_patches, part_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.parts import body_parts, parts_of_bodies
@@ -74,13 +74,7 @@ def test_joints_are_where_the_parts_end(seed: int) -> None:
         assert arm.hand[2] - arm.elbow[2] == pytest.approx(parts.forearm.bottom_m)
 
 
-def test_a_neck_is_one_more_patch_and_none_without_a_width() -> None:
-    body = BodyModel()
-    without, with_neck = cardbox_patches(body, REST), cardbox_patches(body, REST, 0.6)
-    assert (without.shape, with_neck.shape) == ((15, 4, 3), (16, 4, 3))
-    assert len(without[NECK_PATCHES]) == 0
-    np.testing.assert_array_equal(with_neck[:15], without)
-    (neck,) = with_neck[NECK_PATCHES]
+def test_a_neck_is_a_part_of_the_heads_width() -> None:
+    neck = body_parts(DEFAULT_SIZES, 0.6).neck
     # From the torso's top 53 cm to the chin 59 cm above the hips, 0.6 x 17 cm wide.
-    assert np.ptp(neck, axis=0) == pytest.approx((0.0, 0.102, 0.06))
-    assert (neck[:, 0].mean(), neck[:, 2].min()) == pytest.approx((-1.98, 0.03))
+    assert tuple(neck) == pytest.approx((0.53, 0.06, 0.102, 0.102, 0.102, 0.02))

@@ -23,7 +23,7 @@ class Frame:
     body = BODY
 
     def __init__(self, time_s: float) -> None:
-        self.time_s = time_s
+        self.time_s, self.stamp_ns = time_s, round(1e9 * time_s)
 
 
 def estimate(state: str, right: KeypointState = SURE, chance: float = 0.0) -> Estimate:

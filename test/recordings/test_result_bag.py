@@ -18,9 +18,10 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
 from cardbox_tracker.recordings.result_reader import namespace_of, results_in
-from cardbox_tracker.recordings.silhouettes import SilhouetteSource
+from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
+from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
 
 # As ROS 2 Jazzy's own message packages have them.
@@ -47,14 +48,8 @@ def results(
 ) -> tuple[Path, TrackSummary]:
     folder = tmp_path_factory.mktemp("results")
     with result_bag(folder / "bag", source.frame_id, draw=draw_sharp_overlay) as bag:
-        summary = track_recording(
-            Recording([""], [source]),
-            [recording.body],
-            default_preset(),
-            0,
-            0.0,
-            observers=(bag,),
-        )
+        session = Session([recording.body], source.camera)
+        summary = track_recording(Recording([""], [source]), session, TimeSpan(0.0, np.inf), (bag,))
     return folder / "bag", summary
 
 

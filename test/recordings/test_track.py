@@ -29,23 +29,29 @@ from cardbox_tracker.recordings.bag_reader import BagReader
 from cardbox_tracker.recordings.initialize import describe, initialize_from_recording
 from cardbox_tracker.recordings.recording import Recording
 from cardbox_tracker.recordings.result_bag import result_bag
-from cardbox_tracker.recordings.result_table import units
+from cardbox_tracker.recordings.result_table import result_table, units
 from cardbox_tracker.recordings.silhouettes import SilhouetteSource, TimeSpan
 from cardbox_tracker.recordings.track import TrackSummary, track_recording
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.tracking.estimate import Estimate
+from cardbox_tracker.tracking.session import Session
 from cardbox_tracker.tracking.tracker import Tracker
 
 CONFIG = default_preset()
 
 
+def session_of(recording: Any, source: SilhouetteSource, seed: int = 0) -> Session:
+    return Session([recording.body], source.camera, CONFIG, np.random.default_rng(seed))
+
+
 def track(
     recording: Any, source: SilhouetteSource, path: Path, seed: int = 0, **rest: Any
 ) -> TrackSummary:
-    start_s = rest.pop("start_s", recording.start_s())
-    return track_recording(
-        Recording([""], [source]), [recording.body], CONFIG, seed, start_s, path, **rest
-    )
+    span = TimeSpan(rest.get("start_s", recording.start_s()), np.inf)
+    session = session_of(recording, source, seed)
+    with result_table(path, is_smoothed=True) as add:
+        observers = (lambda frame, estimate, _: add(frame, estimate), *rest.get("observers", ()))
+        return track_recording(Recording([""], [source]), session, span, observers)
 
 
 KNOWN = ("stamp", "stamp_ns", "time_s", "state", "state_reason")
@@ -85,15 +91,16 @@ def test_the_tracker_gets_the_images(
         return follow(tracker, observations)
 
     monkeypatch.setattr(Tracker, "track", spy)
-    config = default_preset().changed({"whole_body": {"effort": 0.25}})
-    track_recording(Recording([""], [source]), [recording.body], config, 0, recording.start_s())
+    session = session_of(recording, source)
+    session.configure(default_preset().changed({"whole_body": {"effort": 0.25}}))
+    track_recording(Recording([""], [source]), session, TimeSpan(recording.start_s(), np.inf))
     assert seen
     assert all(image.shape == (240, 320) for image in seen)
 
 
 def test_of_several_people_there_may_be_nobody(recording: Any, source: SilhouetteSource) -> None:
-    given = [recording.body], default_preset(), 0
-    summary = track_recording(Recording([""], [source]), *given, 0.0, end_s=1.0, people=0)
+    session = Session([recording.body], source.camera, people=0)
+    summary = track_recording(Recording([""], [source]), session, TimeSpan(0.0, 1.0))
     assert (summary.frames_tracked, summary.people) == (0, {})
 
 

@@ -13,7 +13,7 @@ from cardbox_tracker.segmentation import background
 from cardbox_tracker.segmentation.background import SilhouetteExtractor
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.empty_scene import BackgroundLearner, BackgroundModel
-from cardbox_tracker.segmentation.regions import clean_in_window, clean_silhouette
+from cardbox_tracker.segmentation.regions import clean_silhouette
 from cardbox_tracker.segmentation.window import window_of
 
 PLAIN = BackgroundConfig(clean_up=False)
@@ -176,9 +176,9 @@ def test_specks_are_dropped_and_persons_kept() -> None:
     made[60:65, 60:65] = 255  # 25 px: 0.25 %
     expected = made.copy()
     expected[60:65, 60:65] = 0
-    np.testing.assert_array_equal(clean_silhouette(made, 0.004, 0.0), expected)
-    np.testing.assert_array_equal(clean_silhouette(made, 0.0025, 0.0), made)
-    assert not clean_silhouette(made, 0.05, 0.0).any()
+    np.testing.assert_array_equal(clean_silhouette(made, 0.004, 0.0)[0], expected)
+    np.testing.assert_array_equal(clean_silhouette(made, 0.0025, 0.0)[0], made)
+    assert not clean_silhouette(made, 0.05, 0.0)[0].any()
 
 
 def test_small_holes_are_filled_and_large_ones_kept() -> None:
@@ -188,8 +188,8 @@ def test_small_holes_are_filled_and_large_ones_kept() -> None:
     made[60:65, 60:65] = 0  # 25 px
     expected = made.copy()
     expected[60:65, 60:65] = 255
-    np.testing.assert_array_equal(clean_silhouette(made, 0.0, 0.0026), expected)
-    np.testing.assert_array_equal(clean_silhouette(made, 0.0, 0.0025), made)
+    np.testing.assert_array_equal(clean_silhouette(made, 0.0, 0.0026)[0], expected)
+    np.testing.assert_array_equal(clean_silhouette(made, 0.0, 0.0025)[0], made)
 
 
 def test_cleaning_leaves_its_input() -> None:
@@ -205,6 +205,6 @@ def test_cleaning_in_a_window_gives_the_same(seed: int, rare: float, max_hole: f
     noise = cv2.GaussianBlur(np.random.default_rng(seed).normal(0, 1, (60, 80)), (0, 0), 2.0)
     made = np.where(noise > rare * noise.std(), 255, 0).astype(np.uint8)
     window = window_of(made).grown(2, made.shape)
-    cleaned, found = clean_in_window(made, 0.01, max_hole, window)
-    np.testing.assert_array_equal(cleaned, clean_silhouette(made, 0.01, max_hole))
+    cleaned, found = clean_silhouette(made, 0.01, max_hole, window)
+    np.testing.assert_array_equal(cleaned, clean_silhouette(made, 0.01, max_hole)[0])
     assert found == window_of(cleaned)

@@ -12,9 +12,10 @@ from hypothesis import strategies as st
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.rasterisation import NEAR_PLANE_M, clip_near, fill_convex, render, snap
 from cardbox_tracker.person import parts as indices
-from cardbox_tracker.person.cardbox import NECK_PATCHES, TORSO_PATCHES, cardbox_patches
+from cardbox_tracker.person.cardbox import TORSO_PATCHES, _frontal, _place, cardbox_patches
+from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.parts import BodyParts, Part, body_parts, shape_of
+from cardbox_tracker.person.parts import BodyParts, Part, body_parts, parts_of_bodies, shape_of
 from cardbox_tracker.person.posture import JOINT_LIMITS, LEFT_ARM, RIGHT_ARM, TORSO
 from cardbox_tracker.person.sizes import DEFAULT_SIZES, SIZE_INDEX, SIZE_LIMITS
 from cardbox_tracker.terms.bit_planes import fill_planes, new_planes
@@ -179,9 +180,11 @@ def test_a_trunk_with_a_neck_is_equal(case: Case) -> None:
     got = np.zeros(len(torsos), np.int64)
     size = compiled.rows, case.camera.width
     trunk_costs(torsos, cardbox, size, planes, silhouette_px, got)
+    neck = _frontal(parts_of_bodies(case.body.sizes, 0.6).neck)[None]
     for cost, posture in zip(got, case.postures, strict=True):
-        patches = cardbox_patches(case.body, posture, 0.6)
-        trunk = np.concatenate([patches[TORSO_PATCHES], patches[NECK_PATCHES]])
+        patches, frames = cardbox_patches(case.body, posture), pose(case.body.rigid, posture)
+        placed = _place(neck, frames.torso_rotation, frames.hip)
+        trunk = np.concatenate([patches[TORSO_PATCHES], placed])
         drawn = render(trunk, case.camera, reference.rows)
         assert cost == np.count_nonzero(drawn ^ silhouette)
 

@@ -92,11 +92,11 @@ def test_reference_postures_are_likely() -> None:
 
 
 def test_samples_are_likely_unit_vectors() -> None:
-    bank = sample_bank(500)
-    assert bank.shape == (500, 6)
+    bank = sample_bank()
+    assert bank.shape == (3000, 6)
     np.testing.assert_allclose(np.linalg.norm(bank.reshape(-1, 3), axis=1), 1.0)
     assert np.median(slow_nats(bank)) < 4.0
-    np.testing.assert_array_equal(bank, sample_bank(500))
+    np.testing.assert_array_equal(bank, sample_bank())
 
 
 def test_the_mixture_is_shared_and_cannot_be_changed() -> None:

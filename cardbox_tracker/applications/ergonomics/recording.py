@@ -36,6 +36,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import STATE_NAMES
 from cardbox_tracker.recordings.result_reader import KeptResults, Results
 from cardbox_tracker.recordings.silhouettes import RecordedFrame
+from cardbox_tracker.recordings.track import worst_moments
 from cardbox_tracker.search.particles import normal_postures
 from cardbox_tracker.tracking.estimate import UNCERTAIN, Estimate
 from cardbox_tracker.tracking.tracker import Tracker
@@ -57,17 +58,16 @@ def header_of(method: Method) -> tuple[str, ...]:
 MEAN_POSTURE = "mean_posture"
 """Name of the grand score of the mean posture among the shares."""
 
-MOST_MOMENTS, GAP_S = 6, 3.0
-"""Number of worst moments, and the least time between two of them, s."""
 LONGEST_STEP = 3.0
 """An image counts until the next one, for at most this multiple of the usual interval."""
-MOST_IMAGES = 1200
-"""Images that are kept. Each worst moment excludes the images within ``GAP_S``, so this suffices
-for up to 39 images a second; about 40 MB."""
+# Images that are kept. Each worst moment excludes the images within GAP_S, so this suffices for up
+# to 39 images a second; about 40 MB.
+_MOST_IMAGES = 1200
 
 # A separate random stream leaves the tracker's random numbers unchanged.
 _STREAM = 0x52756C61
 _WIDTH_PX, _QUALITY = 640, 80
+_MOST_MOMENTS = 6
 
 
 @dataclass(frozen=True)
@@ -90,17 +90,16 @@ class RulaRow:
 class MomentImages:
     """The images of the highest scores, with the model drawn over them."""
 
-    def __init__(self, is_head_hidden: bool = True, most: int = MOST_IMAGES) -> None:
-        """Keep up to ``most`` images; ``is_head_hidden`` makes the heads unrecognizable."""
+    def __init__(self, is_head_hidden: bool = True) -> None:
+        """Start without images; ``is_head_hidden`` makes the heads unrecognizable."""
         self.is_head_hidden = is_head_hidden
-        self._most = most
         # The lowest score comes first, and of equal scores the latest image.
         self._kept: list[tuple[float, int, bytes]] = []
 
     def add(self, row: RulaRow, frame: RecordedFrame, estimate: Estimate, tracker: Tracker) -> None:
         """Keep the image of ``row`` if its score is among the highest."""
         rank = row.worst, -row.stamp_ns
-        if not row.worst or (len(self._kept) == self._most and rank < self._kept[0][:2]):
+        if not row.worst or (len(self._kept) == _MOST_IMAGES and rank < self._kept[0][:2]):
             return
         picture, camera, body = frame.image, tracker.camera, tracker.body
         if self.is_head_hidden:
@@ -110,7 +109,7 @@ class MomentImages:
         canvas = draw_overlay(picture, body, camera, estimate, scale)
         _, jpeg = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])
         heapq.heappush(self._kept, (*rank, jpeg.tobytes()))
-        if len(self._kept) > self._most:
+        if len(self._kept) > _MOST_IMAGES:
             heapq.heappop(self._kept)
 
     def by_stamp(self) -> dict[int, bytes]:
@@ -166,19 +165,10 @@ class ScoreObserver:
         return [row for results in kept.results().values() for row in self._score(results)]
 
 
-def worst_moments(
-    rows: Sequence[RulaRow], most: int = MOST_MOMENTS, gap_s: float = GAP_S
-) -> tuple[RulaRow, ...]:
-    """Return up to ``most`` images with the highest expected scores, ``gap_s`` or more apart.
-
-    The earlier one of equal scores comes first. Images without a posture do not count.
-    """
-    found: list[RulaRow] = []
-    for row in sorted(rows, key=lambda row: (-row.worst, row.stamp_ns)):
-        is_apart = all(abs(row.stamp_ns - one.stamp_ns) >= gap_s * 1e9 for one in found)
-        if len(found) < most and row.worst and is_apart:
-            found.append(row)
-    return tuple(found)
+def worst_rows(rows: Sequence[RulaRow]) -> list[RulaRow]:
+    """Return the images with the highest expected scores, the worst one first."""
+    scored = ((row.worst, row.stamp_ns, row) for row in rows if row.worst)
+    return worst_moments(scored, _MOST_MOMENTS)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,6 @@ import numpy as np
 
 from cardbox_tracker.applications.drawing.page import png_of, render_page
 from cardbox_tracker.applications.ergonomics.recording import (
-    GAP_S,
     LONGEST_STEP,
     RulaRow,
     RulaSummary,
@@ -18,7 +17,7 @@ from cardbox_tracker.applications.ergonomics.recording import (
     durations_of,
     score_shares,
     summarize,
-    worst_moments,
+    worst_rows,
 )
 from cardbox_tracker.applications.ergonomics.rula import (
     NOT_SEEN,
@@ -29,6 +28,7 @@ from cardbox_tracker.applications.ergonomics.rula import (
     expected,
 )
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.recordings.track import GAP_S
 from cardbox_tracker.tracking.estimate import UNCERTAIN
 
 _ACTION_COLOURS = ("#d9ecd5", "#fdf1c4", "#fbd5ac", "#f2aaa0", "#d98c8c")
@@ -86,7 +86,7 @@ def write_page(content: PageContent, path: Path) -> None:
     """Write the page, one file of HTML without scripts (``page.html``), or raise CardboxError."""
     rows, config, method = content.rows, content.config, content.method
     summary = summarize(rows, method)
-    shares, moments = score_shares(rows, config, method), worst_moments(rows)
+    shares, moments = score_shares(rows, config, method), worst_rows(rows)
     colours = _ACTION_COLOURS[: len(method.levels)]
     levels = zip(method.levels, colours, summary.by_level_s, strict=True)
     render_page(

@@ -30,14 +30,13 @@ _FINGERS_TO_FOREARM = 0.25
 # within 4 mm of the line on which the model raises it.
 _CLAVICLE = 0.43
 _TURN_BOW_BEND = ("Yrotation", "Xrotation", "Zrotation")
+# As the axes X, Y and Z of the joints.
 _SWING = ("Zrotation", "Xrotation", "Yrotation")
 _STRIDE = ("Xrotation", "Zrotation", "Yrotation")
 # From the ankle to the toes, as a share of the stature.
 _TOES = 0.1
 _PLACE = ("Xposition", "Yposition", "Zposition")
-# Rotations about the axes X, Y and Z of the joints, and the bones of the joints by the beginning of
-# their names.
-_CHANNELS = ("Zrotation", "Xrotation", "Yrotation")
+# The bones of the joints by the beginning of their names.
 _BONES = {
     "torso_yaw": "Hips",
     "torso_pitch": "Spine",
@@ -112,7 +111,7 @@ def channel_values(motion: Motion, body: BodyModel) -> dict[str, FloatArray]:
         bone = _BONES.get(what) or _BONES.get(what.partition("_")[0])
         if bone is not None:
             bone = joint.side.capitalize() + bone
-            sign, channel = sum(joint.axis), _CHANNELS[np.flatnonzero(joint.axis)[0]]
+            sign, channel = sum(joint.axis), _SWING[np.flatnonzero(joint.axis)[0]]
             values[bone][:, channels[bone].index(channel)] = sign * held(angle[:, None])[:, 0]
     for (name, side), arm in zip(_SIDES, (frames.left, frames.right), strict=True):
         local = np.einsum("nji,nj->ni", frames.torso_rotation, arm.shoulder - frames.hip)

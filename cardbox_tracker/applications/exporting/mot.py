@@ -44,7 +44,6 @@ HAND = ("wrist_flex", "wrist_dev", "pro_sup")
 """Rotations of the hand to the palm and to the little finger, and of the forearm, whose 0 is full
 supination: 90 degrees from ours."""
 
-_MIRROR = np.array([1.0, 1.0, -1.0])
 _STORAGE = "DataType=double", "version=3"
 
 
@@ -53,8 +52,7 @@ def coordinates_of(states: FloatArray) -> dict[str, FloatArray]:
     found = dict(zip(LUMBAR, thorax_angles(states).T, strict=True))
     for suffix, arm, side in (("r", RIGHT_ARM, -1.0), ("l", LEFT_ARM, 1.0)):
         directions = arm_directions(states[:, arm], side)
-        mirror = _MIRROR if side > 0 else np.ones(3)
-        angles = _arm_angles(*(one @ LABORATORY.T * mirror for one in directions))
+        angles = _arm_angles(*(one @ LABORATORY.T * (1.0, 1.0, -side) for one in directions))
         found |= {f"{name}_{suffix}": angles[:, i] for i, name in enumerate(ARM)}
     return found
 

@@ -19,6 +19,7 @@ from cardbox_tracker.person.sizes import FloatArray
 from cardbox_tracker.person.skeleton import (
     KEYPOINT_NAMES,
     POSTURE_GROUPS,
+    SHOULDERS,
     STATE_NAMES,
     Group,
     KeypointState,
@@ -170,9 +171,6 @@ def held(values: FloatArray) -> FloatArray:
 
 
 _VALUES = [entry.name for entry in fields(Motion)][3:-1]
-
-
-SHOULDERS = [KEYPOINT_NAMES.index(f"{side}_shoulder") for side in ("left", "right")]
 
 # Rounding in tables is far below the first. A shoulder rises by less than the second.
 _MOST_APART_M = 0.005

@@ -20,7 +20,6 @@ from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.common.errors import CardboxError, InitializationError
 from cardbox_tracker.common.progress import told
 from cardbox_tracker.measuring.guidance import Cancellation, Prompt, guide, measuring, spoken
-from cardbox_tracker.measuring.saved_model import SavedModel
 from cardbox_tracker.measuring.scale import SCALE_REFERENCES
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import dumps_body_model
@@ -36,6 +35,7 @@ from cardbox_tracker.ros.nodes.reference_capture import (
     SecondCamera,
     measured,
 )
+from cardbox_tracker.ros.nodes.saved_model import SavedModel
 from cardbox_tracker.ros.runtime import qos
 from cardbox_tracker.ros.runtime.command_line import node_main
 from cardbox_tracker.ros.runtime.node import CardboxNode

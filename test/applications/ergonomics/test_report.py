@@ -15,6 +15,7 @@ import cv2
 import numpy as np
 import pytest
 
+from cardbox_tracker.applications.ergonomics import recording
 from cardbox_tracker.applications.ergonomics.recording import (
     MomentImages,
     RulaRow,
@@ -23,7 +24,7 @@ from cardbox_tracker.applications.ergonomics.recording import (
     score_rula,
     score_shares,
     summarize,
-    worst_moments,
+    worst_rows,
     write_csv,
 )
 from cardbox_tracker.applications.ergonomics.report import (
@@ -145,13 +146,12 @@ def test_worst_moments_are_apart() -> None:
         row(7.0, None, "lost"),
         row(9.0, 2),
     ]
-    found = worst_moments(rows, most=3, gap_s=3.0)
+    found = worst_rows(rows)
     assert [one.time_s for one in found] == [6.0, 2.0, 9.0]
-    assert [one.time_s for one in worst_moments(rows, most=1)] == [6.0]
 
 
 def test_without_a_posture_there_is_no_moment() -> None:
-    assert worst_moments([row(1, None, "lost")]) == ()
+    assert worst_rows([row(1, None, "lost")]) == []
 
 
 def test_the_report_names_what_was_not_seen() -> None:
@@ -231,7 +231,7 @@ def test_a_page_is_whole_by_itself(tmp_path: Path) -> None:
     plot, image = (str(attributes["src"]) for tag, attributes in found.elements if tag == "img")
     assert image == "data:image/jpeg;base64," + base64.b64encode(JPEG).decode()
     png = base64.b64decode(plot.removeprefix("data:image/png;base64,"))
-    assert png == score_plot(ROWS, worst_moments(ROWS))
+    assert png == score_plot(ROWS, worst_rows(ROWS))
     for tag, attributes in found.elements:
         for name in ("src", "href", "action"):
             assert str(attributes.get(name, "data:")).startswith("data:"), tag
@@ -350,12 +350,13 @@ def observed(images: MomentImages, *pitches_rad: float, state: str = TRACKING) -
     return observer
 
 
-def test_the_images_of_the_worst_moments_are_kept() -> None:
+def test_the_images_of_the_worst_moments_are_kept(monkeypatch: pytest.MonkeyPatch) -> None:
     """Trunks of 1, 3 and 4 give 2, 3 and 4 or more; of equal scores the first ones stay."""
-    images = MomentImages(most=2)
+    monkeypatch.setattr(recording, "_MOST_IMAGES", 2)
+    images = MomentImages()
     rows = observed(images, 0.0, 0.6, 1.2, 0.6, 0.0).rows
     assert sorted(images.by_stamp()) == [1 * 10**9, 2 * 10**9]
-    worst, *_ = worst_moments(rows)
+    worst, *_ = worst_rows(rows)
     jpeg = np.frombuffer(images.by_stamp()[worst.stamp_ns], np.uint8)
     picture = cv2.imdecode(jpeg, cv2.IMREAD_COLOR)
     assert picture is not None

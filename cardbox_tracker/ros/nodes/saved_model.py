@@ -20,9 +20,8 @@ class SavedModel:
 
     def __init__(self, name: str) -> None:
         """Read the file if it exists; raise CardboxError if it is no model or cannot be written."""
-        self._path = user_path(name) if name else None
+        self._path, self.warning = user_path(name) if name else None, ""
         self.body: BodyModel | None = None
-        self.warning = ""
         if self._path is None:
             return
         if os.path.exists(self._path):

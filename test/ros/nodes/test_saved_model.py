@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from cardbox_tracker.common.errors import CardboxError
-from cardbox_tracker.measuring.saved_model import SavedModel
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.model_file import save_body_model
+from cardbox_tracker.ros.nodes.saved_model import SavedModel
 
 BODY = BodyModel.of(distance_m=2.3)
 
