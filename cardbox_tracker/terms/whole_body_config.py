@@ -34,7 +34,7 @@ class WholeBodyCostConfig:
     pitch_back_deg: float = 8.0  #: unit of a pitch below the expected one, deg
     yaw_deg: float = 14.0  #: unit of the torso's yaw, deg
     #: the same with points of a detector, which show a turn better than an outline, deg.
-    located_yaw_deg: float = 24.0
+    located_yaw_deg: float = 40.0
     angle_cap: float = 9.0  #: largest cost of one of the torso's angles
     #: unit of the torso's motion along the line of sight from frame to frame, m.
     x_step_m: float = 0.1

@@ -109,12 +109,15 @@ def test_points_show_the_distance_of_who_wears_wide_clothes() -> None:
     points = ImagePoints.of({name: (*at, 0.9) for name, at in zip(names, pixels, strict=True)})
     outline = silhouette(body.with_values(distance_m=1.8))
 
-    def fitted(guess: BodyModel, given: ImagePoints | None) -> BodyModel:
-        more = CAMERA, outline, None, default_preset(), np.random.default_rng(0), given
+    def fitted(guess: BodyModel, given: ImagePoints | None, seed: int = 0) -> BodyModel:
+        more = CAMERA, outline, None, default_preset(), np.random.default_rng(seed), given
         return first_sight.fit_first_sight(guess, *more).body
 
     guess, known = body_from_proportions(1.75), body_from_proportions(1.75, 1.8)
-    alone_m, found_m = (fitted(guess, one).placement.distance_m for one in (None, points))
+    alone_m, found_m = (
+        np.mean([fitted(guess, one, seed).placement.distance_m for seed in range(4)])
+        for one in (None, points)
+    )
     assert 1.75 < alone_m < found_m - 0.03 < 2.0
     assert fitted(known, points) == fitted(known, None)
 
