@@ -74,6 +74,15 @@ def test_colours_as_far_apart_as_0_6_tell_the_same_person(distance: float, is_al
     assert (unlike(None, CLOTHES, None, colours, 0) < OTHER) == is_alike
 
 
+@pytest.mark.parametrize(("away_s", "expected"), [(0.0, 4.0), (0.5, 4.0 / 9.0), (1.0, 4.0 / 25.0)])
+def test_a_place_is_less_sure_by_2_lengths_of_the_trunk_a_second(
+    away_s: float, expected: float
+) -> None:
+    """Half a metre aside is one length of the trunk; at first, half of one is a deviation of 1."""
+    found = unlike(figure(0.0), CLOTHES, figure(100.0), CLOTHES, round(1e9 * away_s))
+    assert found == pytest.approx(expected, rel=0.01)
+
+
 @pytest.mark.parametrize("has_image", [True, False])
 def test_points_of_somebody_else_are_lost_and_the_person_comes_back(
     detected: Callable[..., ImagePoints], has_image: bool
