@@ -55,8 +55,8 @@ and hands, both skeletons shifted to the middle of their shoulders; *place*: not
 Both are of the images that have an estimate, whose number is in `ways.json`. Live figures change
 from run to run. The clips of real_balance and real_two_people last 1.7 s (60 Hz): at full speed
 they are nearly over when the first body is fitted; nan: no image had an estimate. *Exchanged*:
-the people have other numbers than their statures were given by. The last row is the mean of the rows above in which all ways have
-figures."""
+the people have other numbers than their statures were given by. The last row is the mean of the
+rows above in which all ways have figures."""
 _SHOWN = "shape_cm", "place_cm", "tracking", "legs"
 _LONGEST_S = 1800.0
 
