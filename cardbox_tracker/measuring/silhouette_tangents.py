@@ -20,7 +20,13 @@ from numpy.typing import NDArray
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.camera.extrinsics import Extrinsics
 from cardbox_tracker.common.health import WATCHES, Verdict
-from cardbox_tracker.common.least_squares import Residuals, geman_mcclure
+from cardbox_tracker.common.least_squares import (
+    DIFFERENCE,
+    Residuals,
+    geman_mcclure,
+    minimize,
+    rules_of,
+)
 from cardbox_tracker.detectors.image_points import CERTAIN, POINT_NAMES, ImagePoints
 from cardbox_tracker.measuring.motion_lag import MotionLag
 from cardbox_tracker.person.sizes import FloatArray
@@ -33,9 +39,9 @@ _BORDER_PX = 4.0
 _HEIGHT_PX, _HALF_PX = 0.1, 4.0
 # Largest effective number of frames, since neighbouring frames are correlated.
 _COUNTED = 150
-# Roll: Gauss-Newton steps, step of the differences, height with a quarter of the weight, least
-# noise; fewest heights and largest condition number.
-_ROLL_STEPS, _TRIED_RAD, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 0.003, 2.0, 0.3
+# Roll: most steps, height with a quarter of the weight, least noise; fewest heights and largest
+# condition number.
+_ROLL_STEPS, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 2.0, 0.3
 _FEWEST, _LARGEST_CONDITION = 8, 1e6
 
 # Images as they come, mirrored, and upside down: what becomes of columns and rows about the middle.
@@ -136,25 +142,23 @@ def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float
     estimated by weighted least squares. So the highest points (head, raised hands) must lie at
     different columns; if they do not, the deviation is inf.
     """
-    turn = np.zeros(2)
-    for _ in range(_ROLL_STEPS):
-        now = _turned(extrinsics, turn)
+
+    def tops(turn: FloatArray) -> Residuals:
+        now = _turned(extrinsics, turn[0])
         heights = tangents.heights(now)
-        slopes = np.array(
-            [
-                tangents.heights(_turned(now, change)) - tangents.heights(_turned(now, -change))
-                for change in _TRIED_RAD * np.eye(2)
-            ]
-        ) / (2.0 * _TRIED_RAD)
-        known = np.isfinite(heights) & np.isfinite(slopes).all(axis=0)
-        heights, slopes = heights[known], slopes[:, known]
-        weighted = slopes * (1.0 + (heights / _ROLL_HALF_PX) ** 2) ** -2.0
-        matrix = weighted @ slopes.T
-        if len(heights) < _FEWEST or np.linalg.cond(matrix) > _LARGEST_CONDITION:
-            return 0.0, float("inf")
-        turn -= np.linalg.solve(matrix, weighted @ heights)
+        moved = [tangents.heights(_turned(now, step)) for step in DIFFERENCE * np.eye(2)]
+        slopes = (np.column_stack(moved) - heights[:, None]) / DIFFERENCE
+        known = np.isfinite(slopes).all(axis=1)
+        return geman_mcclure(heights[known][None], slopes[known][None], _ROLL_HALF_PX)
+
+    found = minimize({"tops": tops}, np.zeros((1, 2)), rules_of(2), _ROLL_STEPS)
+    turn, information = found.values[0], found.information[0]
+    heights = tangents.heights(_turned(extrinsics, turn))
+    heights = heights[np.isfinite(heights)]
+    if len(heights) < _FEWEST or np.linalg.cond(information) > _LARGEST_CONDITION:
+        return 0.0, float("inf")
     noise_px = max(_LEAST_NOISE_PX, 1.48 * float(np.median(np.abs(heights))))
-    return float(turn[1]), noise_px * float(np.sqrt(np.linalg.inv(matrix)[1, 1]))
+    return float(turn[1]), noise_px * float(np.sqrt(np.linalg.inv(information)[1, 1]))
 
 
 def _turned(extrinsics: Extrinsics, turn: FloatArray) -> Extrinsics:
