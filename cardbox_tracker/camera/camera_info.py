@@ -42,7 +42,7 @@ def unusual(k: NDArray[np.float64], width: int, height: int) -> str:
     if not found:
         return ""
     return (
-        f"the matrix K is unusual: {', and '.join(found)}. Unless the camera is so, results "
+        f"the camera's matrix is unusual: {', and '.join(found)}. Unless the camera is so, results "
         "are wrong: calibrate at the size that width and height state, before binning"
     )
 
