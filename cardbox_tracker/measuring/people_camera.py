@@ -323,7 +323,8 @@ def _upright(sights: Sightings, number: int, camera: Camera) -> _Seen | None:
     rows = [rows[i] for i in np.unique(np.linspace(0, len(rows) - 1, _MOST_IMAGES).astype(int))]
     times_s, px, known, faces, straight, _ = (np.array(one) for one in zip(*rows, strict=True))
     stddevs = np.where(known, _ALONG, np.inf)[..., None] * np.array([_SIDE / _ALONG, 1.0])
-    independent = min(len(rows), 1.0 + float(np.ptp(times_s)) / _SAME_S)
+    # Without straight legs, the trunk may lean in all images alike.
+    independent = min(len(rows), 1.0 + float(np.ptp(times_s) * straight.mean()) / _SAME_S)
     return _Seen(
         np.where(known[..., None], camera.rays(px)[..., :2], 0.0),
         stddevs,

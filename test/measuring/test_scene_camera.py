@@ -127,6 +127,27 @@ def test_the_distance_is_as_sure_by_more_images_of_the_same_time() -> None:
     assert stddevs == pytest.approx([0.065] * 2, rel=0.15)
 
 
+@pytest.mark.parametrize("straight", [0, 1], ids=["no legs", "legs once"])
+def test_a_trunk_that_leans_again_and_again_is_no_camera_that_looks_up(
+    straight: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Somebody who is seen to the hips leans by 0 to 40 degrees in a film of 400 s."""
+    upper_m = np.maximum(MARKED_HEIGHTS - MARKED_HEIGHTS[LEVELS.index("hip")], 0.0)
+    sights = []
+    for number in range(40):
+        lean_rad = np.radians(40.0) * (number % 4) / 3
+        with monkeypatch.context() as leaning:
+            lowered = MARKED_HEIGHTS - upper_m * (1.0 - np.cos(lean_rad))
+            leaning.setattr(f"{__name__}.MARKED_HEIGHTS", lowered)
+            leaning.setattr(f"{__name__}.FORWARD", FORWARD + upper_m * np.sin(lean_rad))
+            one = points(3.0, 0.0, 0.0, 0.0)
+        sights.append((10.0 * number, one if number < straight else replace(one, legs=None)))
+    shown = people_camera([sights], [STATURE_M], CAMERA)
+    assert shown is not None
+    stddev = np.degrees(np.sqrt(shown.covariance[0, 0]))
+    assert stddev > 6.0 and abs(np.degrees(shown.values[0])) < stddev
+
+
 def test_a_distance_is_as_unsure_as_the_pitch_makes_it() -> None:
     sights = [[(at_s, replace(one, legs=None)) for at_s, one in film(STAND, 20.0)]]
     seen = (sights, [(0.0, BLANK)], CAMERA, [STATURE_M])
