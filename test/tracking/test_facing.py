@@ -90,9 +90,9 @@ def see(asked: Facing, frame: Frame, seconds: float, state: np.ndarray = STATE) 
 def test_the_share_of_hair_does_not_depend_on_the_light(hair: float, light: float) -> None:
     asked, frame = facing(), seen(hair, light)
     assert frame.image is not None
-    for _ in range(20):
-        share = asked._hair(frame.image, frame.silhouette, ZONES)
-    assert share == hair
+    assert asked._hair(frame.image, frame.silhouette, ZONES) == hair
+    empty = np.zeros_like(frame.silhouette)
+    assert asked._hair(frame.image, empty, ZONES) is None
 
 
 def test_a_back_is_told_within_a_second_and_forgotten_when_the_face_is_seen() -> None:
@@ -113,6 +113,49 @@ def test_the_usual_share_of_a_person_with_a_fringe_is_no_back() -> None:
     # An eighth more is less than a quarter.
     assert not any(see(asked, seen(0.625), 5.0))
     assert see(asked, seen(1.0), 2.0)[-1]
+
+
+@pytest.mark.parametrize(("face_s", "is_known"), [(0.4, False), (1.4, True)])
+def test_the_usual_share_is_known_after_a_second(face_s: float, is_known: bool) -> None:
+    asked = facing()
+    see(asked, seen(0.0), face_s)
+    assert any(see(asked, seen(1.0), 0.6)) == is_known
+
+
+@pytest.mark.parametrize(("seconds", "is_back"), [(20.0, True), (60.0, False)])
+def test_a_slow_turn_is_told_and_hair_that_looks_darker_by_and_by_is_not(
+    seconds: float, is_back: bool
+) -> None:
+    asked = facing()
+    see(asked, seen(0.0), 5.0)
+    shares = np.linspace(0.0, 1.0, round(seconds / INTERVAL_S))
+    # Columns are few, so their mean over four images has the share.
+    columns = np.floor(8 * shares + np.resize([0.0, 0.5, 0.25, 0.75], len(shares)))
+    told = [see(asked, seen(number / 8), INTERVAL_S)[0] for number in columns]
+    assert any(told) == is_back
+
+
+def test_hair_above_the_forehead_and_a_beard_do_not_count() -> None:
+    asked, face, back = facing(), seen(0.0), seen(1.0)
+    assert face.image is not None and back.image is not None
+    rows = np.arange(240)[:, None, None]
+    middle = np.abs(rows - ZONES[1]) < 0.4 * ZONES[3]
+    image = np.where(middle, face.image, back.image)
+    assert asked._hair(image, face.silhouette, ZONES) == 0.0
+
+
+@pytest.mark.parametrize(("share", "is_hair"), [(0.3, False), (0.5, True)])
+def test_a_colour_is_hair_if_it_is_twice_as_probable_for_the_head(
+    share: float, is_hair: bool
+) -> None:
+    dark = (96, 96, 96)
+    histograms = appearance().histograms.copy()
+    bin_ = (4 * 12 + 4) * 12 + 4
+    histograms[HAND, bin_], histograms[HEAD, bin_] = 0.2, share
+    frame = seen(1.0, hair_colour=dark)
+    asked = facing(appearance=Appearance.of(histograms, np.array(SHIRT, float)))
+    assert frame.image is not None
+    assert asked._hair(frame.image, frame.silhouette, ZONES) == is_hair
 
 
 def test_who_was_never_seen_from_the_front_is_not_doubted() -> None:
