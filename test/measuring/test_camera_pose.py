@@ -236,6 +236,30 @@ def test_nothing_is_said_of_a_camera_before_a_window_of_frames(one_step: None) -
     assert not asked.is_due
 
 
+def test_a_camera_is_checked_again_after_48_seconds(one_step: None) -> None:
+    asked = agreement(TRUE, 15)
+    asked.check()
+    shown = framed(*[np.full((240, 320), 255, np.uint8)] * 2)
+    frames = 0
+    while not asked.is_due:
+        asked.see(waving(1)[0], shown)
+        frames += 1
+    assert frames == 48 * 15
+
+
+@pytest.mark.parametrize(("between_deg", "is_told"), [(7.0, True), (14.0, False)])
+def test_a_wrong_height_is_a_gross_error_of_a_narrow_pair_before_it_is_one_of_others(
+    between_deg: float, is_told: bool
+) -> None:
+    pose = aside(np.radians(between_deg))
+    wrong = moved_by(pose, np.radians([0.9, *[0.0] * 5]))
+    view = View.of(BODY, CAMERA, OtherCamera(OTHER, wrong))
+    asked = CameraAgreement(BODY, CAMERA, [view])
+    for frame in sightings(waving(12), pose=pose):
+        asked.look(framed(frame.first, view.upright(frame.other, is_mask=True)))
+    assert asked.are_contradicted == [is_told]
+
+
 def test_frames_in_which_others_hide_pixels_do_not_count() -> None:
     full = np.full((240, 320), 255, np.uint8)
     hidden = [one.changed(channels={**one.channels, "covered": full}) for one in framed(full, full)]
