@@ -122,6 +122,19 @@ def test_a_camera_that_is_bumped_is_told_within_two_seconds_and_nobody_is_sure(
     assert cameras.is_contradicted
 
 
+def test_who_sways_before_a_plain_wall_moves_no_camera() -> None:
+    """The silhouette lacks five pixels of a person in a bright pattern."""
+    rng, cameras = np.random.default_rng(0), CameraFaults(2)
+    wall = np.kron(rng.integers(80, 120, (12, 16)), np.ones((20, 20))).astype(np.uint8)
+    shirt = np.kron(rng.integers(0, 255, (36, 12)), np.ones((5, 5))).astype(np.uint8)
+    for number in range(60):
+        image, mask, left = wall.copy(), np.zeros((240, 320), np.uint8), 130 + min(number, 12)
+        image[60:, left : left + 60] = shirt
+        mask[65:, left + 5 : left + 55] = 255
+        cameras.without([Observation(mask, image), None], number * 66_666_667)
+    assert cameras.remarks() == []
+
+
 def test_a_mirrored_person_in_space_is_unlike() -> None:
     """The first camera sees the person from the front, the other one from their left."""
     px = np.full((17, 2), 40.0)
