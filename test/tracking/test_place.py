@@ -25,6 +25,7 @@ from cardbox_tracker.tracking.estimate import (
     TRACKING,
     UNCERTAIN,
     Estimate,
+    Place,
 )
 from cardbox_tracker.tracking.place import (
     DEPTH,
@@ -44,9 +45,12 @@ ARM_M = TALL.size("upper_arm_length") + TALL.size("forearm_length")
 
 
 def points_at(distance_m: float, scale: float = 1.0, turn_rad: float = 0.0) -> ImagePoints:
-    """Return points of shoulders and elbows of TALL, whose space is ``scale`` times as large."""
-    upper_m = 0.452 * ARM_M
+    """Return points of arms and hips of TALL, whose space is ``scale`` times as large."""
+    upper_m, fore_m, trunk_m = 0.452 * ARM_M, 0.388 * ARM_M, 0.818 * ARM_M
     there = {
+        "left_hip": (0.1, trunk_m - 0.1, 0.0),
+        "right_hip": (-0.1, trunk_m - 0.1, 0.0),
+        "left_wrist": (0.18 + 0.6 * upper_m, -0.1 + 0.8 * upper_m + fore_m, 0.0),
         "left_shoulder": (0.18, -0.1, 0.0),
         "right_shoulder": (-0.18, -0.1, 0.0),
         "left_elbow": (0.18 + 0.6 * upper_m, -0.1 + 0.8 * upper_m, 0.0),
@@ -185,7 +189,9 @@ def test_a_distance_that_is_only_guessed_is_uncertain_unless_depth_shows_it() ->
         assert place is not None and place.state is state
 
 
-@pytest.mark.parametrize(("stature_m", "is_told"), [(1.80, False), (1.44, True), (2.16, True)])
+@pytest.mark.parametrize(
+    ("stature_m", "is_told"), [(1.80, False), (1.62, False), (1.55, True), (2.16, True)]
+)
 def test_a_stature_that_contradicts_the_given_distance_is_told(
     stature_m: float, is_told: bool
 ) -> None:
@@ -228,7 +234,7 @@ def test_a_stature_that_contradicts_depth_or_a_second_camera_is_told(depth: bool
 def test_points_that_err_for_a_moment_contradict_no_later_version_of_a_body() -> None:
     body = body_from_proportions(1.80)
     watch = PlaceWatch(body, CAMERA)
-    for frame in (*frames(points_at(2.0), count=20), *frames(points_at(2.4), count=60)[20:]):
+    for frame in (*frames(points_at(2.0)), *frames(points_at(2.4), count=60)[10:]):
         if frame.stamp_ns in (20 * 10**8, 40 * 10**8):
             watch = PlaceWatch(body, CAMERA, watch)
         watch.see(estimate_at(2.0, body), body, frame, is_alone=False)
@@ -278,3 +284,18 @@ def test_a_change_of_the_distance_counts_if_the_outline_fits_as_usual(
         assert place is not None
         assert (place.state is KeypointState.TRACKED) == is_tracked
         assert place.stddev_m[0] == pytest.approx(off_m, abs=0.02)
+
+
+@pytest.mark.parametrize(("images", "is_sure"), [(100, False), (130, True)])
+def test_an_overlap_is_usual_after_eight_seconds(images: int, is_sure: bool) -> None:
+    """At 15 Hz, of the latest ten."""
+    watch, frame = PlaceWatch(TALL, CAMERA), frames(None)[0]
+    for distance_m, iou in (*[(2.0, 0.9)] * 200, *[(2.0, 0.8)] * images, (3.0, 0.8)):
+        place = watch.see(replace(estimate_at(distance_m, TALL), iou=iou), TALL, frame)
+    assert place is not None
+    assert (place.state is KeypointState.TRACKED) == is_sure
+
+
+def test_a_place_that_is_wrong_in_one_of_ten_cases_is_uncertain() -> None:
+    for chance, state in ((0.07, KeypointState.TRACKED), (0.15, KeypointState.UNCERTAIN)):
+        assert Place(np.zeros(3), chance, STATURE).state is state
