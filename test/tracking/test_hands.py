@@ -183,6 +183,25 @@ def test_the_depth_of_the_mirror_image_is_told_by_the_fingers(side: str) -> None
     assert first.palm @ palm > np.cos(0.3)
 
 
+@pytest.mark.parametrize(("bent", "least", "most"), [(0.1, 44.0, 58.0), (0.5, 35.0, 45.0)])
+def test_fingers_that_bend_more_make_the_mirror_image_less_likely(
+    bent: float, least: float, most: float
+) -> None:
+    estimate, points = arm("left", -DOWN)
+    palm = (-RIGHT - 0.5 * AHEAD) / np.sqrt(1.25)
+    found = measured("left", hand((bent,) * 5, palm=palm), points, estimate, CAMERA)
+    assert least < np.degrees(found.turn_stddev) < most
+
+
+def test_the_flexion_of_a_hand_that_looks_too_short_is_less_sure() -> None:
+    """Half as long and wide as usual: fingers may point to the camera, or it is a small hand."""
+    estimate, points = arm("left", DOWN)
+    whole = hand(fingers=DOWN)
+    half = whole._replace(px=(whole.px + whole.px[0]) / 2)
+    sure, unsure = (measured("left", one, points, estimate, CAMERA) for one in (whole, half))
+    assert 1.3 < unsure.wrist_stddev[0] / sure.wrist_stddev[0] < 1.9
+
+
 @given(turn=st.floats(-3.1, 3.1), flexion=st.floats(-1.4, 1.4), deviation=st.floats(-1.0, 1.0))
 def test_directions_of_a_hand_are_a_frame_with_these_angles(
     turn: float, flexion: float, deviation: float
