@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.search import particle_filter
 from cardbox_tracker.search.config import FilterConfig
-from cardbox_tracker.search.particle_filter import SPREAD_PX, ParticleFilter
+from cardbox_tracker.search.particle_filter import ParticleFilter
 
 NOISE = np.array([0.25, 0.02, 0.1])
 WIDE = np.array([[-100.0, 100.0]] * 3)
@@ -169,14 +169,14 @@ def test_the_best_by_hand() -> None:
     ],
 )
 def test_the_mean_by_hand(count: int, expected: float, spread_scale: float) -> None:
-    half = SPREAD_PX * spread_scale * np.log(2.0)
+    half = 60.0 * spread_scale * np.log(2.0)
     costs = 500.0 + np.array([2 * half, 0.0, 1e6, half])
     filters = with_particles(np.array([9.0, 6, -1e3, 3]), costs)
     assert filters.mean(count, spread_scale)[0] == pytest.approx(expected)
 
 
 def test_the_standard_deviation_by_hand() -> None:
-    half = SPREAD_PX * np.log(2.0)
+    half = 60.0 * np.log(2.0)
     costs = 500.0 + np.array([1e6, half, 0.0, 1e6])
     filters = with_particles(np.array([99.0, 1, 0, -99]), costs)
     # Those at 0 and 1 weigh 2/3 and 1/3: variance 2/9 around their mean of 1/3.
@@ -189,7 +189,7 @@ def test_the_standard_deviation_by_hand() -> None:
 
 
 def test_a_larger_image_spreads_the_weights_of_the_standard_deviation() -> None:
-    half = 4.0 * SPREAD_PX * np.log(2.0)
+    half = 4.0 * 60.0 * np.log(2.0)
     filters = with_particles(np.array([0.0, 1, 4]), 500.0 + np.array([0.0, half, 2 * half]))
     # Weights 4/7, 2/7 and 1/7 around 0.
     assert filters.stddev(np.zeros(1), 4.0)[0] == pytest.approx(np.sqrt(2 / 7 + 16 / 7))

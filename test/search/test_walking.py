@@ -39,9 +39,10 @@ def test_whoever_walks_across_faces_where_they_go(side: float, step_m: float) ->
         walk.see(INSIDE, side * step_m * i / 2.0, 2.0)
     # Towards positive torso_y, the right of the image, is a turn to the person's left.
     assert np.degrees(walk.yaw_rad) == pytest.approx(side * 80.0)
-    for _ in range(60):
+    # Half of the way, 0.25 m times 0.95 in each image, is left after 13.5 images.
+    for number in range(1, 21):
         walk.see(INSIDE, side * step_m * 29 / 2.0, 2.0)
-    assert walk.yaw_rad == 0.0
+        assert number not in (10, 20) or (walk.yaw_rad == 0.0) == (number == 20)
 
 
 @given(st.floats(0.0, 0.05), st.floats(0.1, 1.0))

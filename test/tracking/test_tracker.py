@@ -516,6 +516,31 @@ class StandingStill:
         return np.full(12, 0.5)
 
 
+def part_of(silhouette: np.ndarray, share: float) -> np.ndarray:
+    """The first pixels of a silhouette."""
+    part = np.zeros_like(silhouette)
+    chosen = np.flatnonzero(silhouette[: np.flatnonzero(silhouette.any(axis=1))[0] + 200])
+    part.flat[chosen[: round(share * len(chosen))]] = 255
+    return part
+
+
+@pytest.mark.parametrize(("share", "is_sudden"), [(1 / 3, False), (1 / 5, True)])
+def test_most_of_the_foreground_that_is_gone_was_not_the_person(
+    share: float, is_sudden: bool
+) -> None:
+    tracker = make(default_preset())
+    tracker.track(seen(front()))
+    tracker.track(part_of(seen(front()), share))
+    presence: Any = tracker.filter._presence  # type: ignore[attr-defined]
+    assert presence.is_elsewhere == is_sudden
+
+
+@pytest.mark.parametrize(("share", "is_there"), [(1 / 3, True), (1 / 5, False)])
+def test_the_paper_needs_a_quarter_of_a_person(share: float, is_there: bool) -> None:
+    found = make(paper_preset()).track(part_of(seen(front()), share))
+    assert (found.state != NO_PERSON) == is_there
+
+
 def test_the_tracker_takes_another_filter() -> None:
     config = replace(paper_preset(), cycles=2)
     tracker = make(config, make_filter=partial(Cycles, make_hierarchy=StandingStill))
