@@ -145,6 +145,15 @@ def test_points_show_how_far_somebody_is_turned(
     assert np.degrees(estimate.posture[YAW]) == pytest.approx(yaw_deg, abs=10.0)
 
 
+def test_who_turns_once_round_is_followed(detected: Detect) -> None:
+    tracker, posture = Tracker(MEASURED, CAMERA, default_preset()), reference_posture("front")
+    for number in range(90):
+        posture[YAW] = np.radians(5.0 * number)
+        points = detected(MEASURED, CAMERA, posture)
+        found = tracker.track(Observation(silhouette(posture, MEASURED), points=points)).posture
+        assert found is not None and np.cos(found[YAW] - posture[YAW]) > np.cos(np.radians(25.0))
+
+
 def is_tracked(found: tuple[np.ndarray, list[Estimate]], body: BodyModel) -> bool:
     """Whether all frames were, but for doubt about a hand's depth.
 
