@@ -9,10 +9,12 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.applications.simulation.renderer import Renderer
 from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.rasterisation import render
+from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture, state_limits
 from cardbox_tracker.person.skeleton import KeypointState
-from cardbox_tracker.search.approach import Approach, at_distances
+from cardbox_tracker.search.approach import Approach, at_distances, placed_upright
 from cardbox_tracker.search.config import default_preset
 from cardbox_tracker.search.doubt import HANDS, Source, models
 from cardbox_tracker.search.visibility import is_trackable
@@ -106,6 +108,15 @@ def test_what_can_be_tracked(x_m: float, y_m: float, is_enough: bool) -> None:
     state = np.append(FRONT, [x_m, 0.0])
     state[0] = y_m
     assert is_trackable(made(), state) is is_enough
+
+
+@pytest.mark.parametrize(("there_m", "is_found"), [(2.07, False), (2.1, True)])
+def test_another_distance_has_to_fit_much_better(there_m: float, is_found: bool) -> None:
+    """The next distance that is tried is 2.17 m."""
+    body, state = BodyModel.of(distance_m=there_m, hip_height_m=HIP_HEIGHT_M), np.zeros(14)
+    state[:12] = FRONT
+    shown = render(cardbox_patches(body, FRONT), CAMERA)
+    assert (placed_upright(made(), [shown], state, state) is not None) == is_found
 
 
 WIDE = np.tile([-20.0, 20.0], (14, 1))

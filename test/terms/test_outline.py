@@ -10,8 +10,8 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import N_STATE, reference_posture
 from cardbox_tracker.terms.body_outline import BODY_PATCHES, corners_of_body
 from cardbox_tracker.terms.kernel_arguments import body_tuple
-from cardbox_tracker.terms.outline import INFORMATION, Outline, signed_distances
-from cardbox_tracker.terms.outline_distances import HALF_PX
+from cardbox_tracker.terms.outline import Outline, signed_distances
+from cardbox_tracker.terms.outline_distances import SeenOutline
 from cardbox_tracker.terms.outline_points import POINTS, find_outline
 from cardbox_tracker.terms.term import Posed
 
@@ -52,16 +52,14 @@ def test_residuals_and_jacobian_are_those_of_numerical_derivatives(
     now = distances(STATE)
     steps = 1e-5 * np.eye(N_STATE)
     jacobian = np.array([distances(STATE + d) - distances(STATE - d) for d in steps]) / 2e-5
-    outlying = 1.0 + (now / HALF_PX) ** 2
-    root = np.sqrt(INFORMATION * length) / outlying
+    outlying = 1.0 + (now / 5.0) ** 2
+    root = np.sqrt(0.01 * length) / outlying
     np.testing.assert_allclose(found.values[0, :n], root * now, atol=1e-5)
     assert not found.values[0, n:].any() and not found.jacobian[0, n:].any()
     expected = (root * jacobian).T
     # The outline of a round part differs from a rigid motion along itself.
     assert np.linalg.norm(found.jacobian[0, :n] - expected) < 0.05 * np.linalg.norm(expected)
-    assert found.costs[0] == pytest.approx(
-        (INFORMATION * length * now**2 / outlying).sum(), rel=1e-4
-    )
+    assert found.costs[0] == pytest.approx((0.01 * length * now**2 / outlying).sum(), rel=1e-4)
 
 
 def corners_px(state: np.ndarray) -> np.ndarray:
@@ -78,7 +76,7 @@ def test_a_residual_is_the_distance_with_its_weight() -> None:
     known = found.values[0] != 0.0
     squares = found.values[0, known] ** 2
     assert 0.5 * found.costs[0] < squares.sum() <= found.costs[0]
-    assert found.costs[0] < INFORMATION * HALF_PX**2 * 1000
+    assert found.costs[0] < 0.01 * 5.0**2 * 1000
 
 
 def test_nobody_has_no_residuals() -> None:
@@ -97,3 +95,18 @@ def test_distances_are_signed_and_cover_what_is_seen() -> None:
     shift = np.array([left, left, top, top])
     np.testing.assert_array_equal(within + shift, [21, 58, 11, 49])
     assert signed_distances(silhouette, -100.0)[2].size == 0
+
+
+def test_distances_of_camera_poses_are_of_every_fourth_pixel_around_the_person() -> None:
+    camera = Camera(320, 240, 300.0, 300.0, 159.5, 119.5)
+    silhouette = np.zeros((240, 320), np.uint8)
+    silhouette[60:180, 100:200] = 255
+    # Four rows above those of the hips, 144.5.
+    seen = SeenOutline(silhouette, camera, np.array([0.0, 25.0 / 150.0, 2.0]))
+    # 24 px at the sides and above.
+    assert seen.distances.size == (24 + 100 + 24) // 4 * ((24 + 80) // 4)
+    # A patch whose edges lie within the outer pixels paints them all, so it is half a pixel smaller.
+    corners = [(99.75, 59.75), (199.25, 59.75), (199.25, 179.25), (99.75, 179.25)]
+    there = [((u - 159.5) / 150.0, (v - 119.5) / 150.0, 2.0) for u, v in corners]
+    near = np.abs(seen.distances) < 8.0
+    np.testing.assert_allclose((seen.drawn(np.array([there])) - seen.distances)[near], 0.5)
