@@ -16,7 +16,7 @@ from cardbox_tracker.person.model import BodyModel
 from cardbox_tracker.person.posture import reference_posture
 from cardbox_tracker.search.config import default_preset, paper_preset
 from cardbox_tracker.tracking.estimate import LOST, NO_PERSON, TRACKING, UNCERTAIN, Estimate
-from cardbox_tracker.tracking.person_region import PersonRegion
+from cardbox_tracker.tracking.person_region import CHANGED, SAME, PersonRegion, StillThings
 from cardbox_tracker.tracking.tracker import Tracker
 
 CAMERA = Camera(160, 120, 100.0, 100.0, 79.5, 59.5)
@@ -112,6 +112,19 @@ def test_more_than_can_be_reached_is_left_out_where_it_touches() -> None:
 def test_where_all_is_foreground_nothing_is_cut_out() -> None:
     # A lamp: the tracker has to see that this is no person.
     assert region().select(box(0, 160), FRONT, True).all()
+
+
+def test_a_thing_is_known_after_eight_images_and_forgotten_after_ten_seconds_of_others() -> None:
+    things = StillThings()
+    grey, thing = np.full((2, 8), 100, np.uint8), np.full((2, 8), 2, np.uint8)
+    for number in range(200):
+        things.learn(grey, thing)
+        assert (things.compare(grey) == SAME).all() == (number >= 7)
+    assert (things.compare(grey + np.uint8(18)) == SAME).all()
+    assert (things.compare(grey + np.uint8(19)) == CHANGED).all()
+    # At 15 Hz, less the half a second after which things are known.
+    counts = [things.learn(grey + np.uint8(50), thing) or things.compare(grey) for _ in range(160)]
+    assert [int((one == SAME).all()) for one in counts] == [1] * 142 + [0] * 18
 
 
 @pytest.mark.parametrize("channels", [1, 3])
