@@ -18,8 +18,8 @@ from cardbox_tracker.terms.term import Frame, Silhouette
 
 # Multiples of the last distance at which the last posture is proposed.
 _SCALES = np.exp([-0.16, -0.08, -0.04, 0.04, 0.08, 0.16])
-# Distances at which an upright person is sought who appears or is lost, m.
-_DISTANCES_M: FloatArray = 0.7 * 1.12 ** np.arange(22, dtype=np.float64)
+DISTANCES_M: FloatArray = 0.7 * 1.12 ** np.arange(22, dtype=np.float64)
+"""Distances at which an upright person is sought who appears or is lost, m."""
 # Another distance must have this part of the differing pixels at the expected one.
 _BETTER = 0.6
 # Distance from the home at which a person begins to walk, and farthest home, m.
@@ -130,7 +130,7 @@ def placed_upright(
     seeing = cost.seeing
     candidates = [
         np.clip(expected, *cost.limits.T),
-        *at_distances(upright, _DISTANCES_M, cost.place[0], cost.limits),
+        *at_distances(upright, DISTANCES_M, cost.place[0], cost.limits),
     ]
     misfits = []
     for state in candidates:

@@ -30,20 +30,19 @@ from cardbox_tracker.measuring.silhouette_tangents import EVERY, PoseDirection, 
 from cardbox_tracker.person.model import MEASURED, BodyModel
 from cardbox_tracker.person.posture import TORSO_X, TORSO_Y
 from cardbox_tracker.person.sizes import FloatArray
+from cardbox_tracker.search.approach import DISTANCES_M
 from cardbox_tracker.terms.term import Frame
 from cardbox_tracker.tracking.tracked_camera import middle
 
-# Samples in a window (12 s at 15 Hz), and between two checks.
+# Samples in a window (12 s at 15 Hz), and between two checks; as many tangents show the roll.
 _WINDOW, _AGAIN = 15, 60
 LEAST_SIGHTINGS = 8
 """Least number of samples of a recording."""
-# Roll: samples, and the largest accepted standard deviation in degrees.
-_TOPS, _SURE_DEG = 70, 0.5
 # Least sine of the angle between lines of sight that show a distance.
 _LEAST_ANGLE = 0.2
-# Lines of sight at a smaller angle are those of a narrow pair. Where the tracker looks for a
-# person, m, and how far a distance by the size may be off.
-_NARROW_DEG, _SEEN_M, _SIZES = 10.0, (0.7, 7.6), np.array([0.85, 1.15])
+# Lines of sight at a smaller angle are those of a narrow pair. How far a distance by the size may
+# be off.
+_NARROW_DEG, _SIZES = 10.0, np.array([0.85, 1.15])
 
 
 class _Compared:
@@ -57,7 +56,7 @@ class _Compared:
         offset_m = view.camera.reference_to_optical_rotation() @ view.offset_m
         self.upright = Extrinsics(axes, offset_m)
         self.kept, self.missing = deque[Sighting](maxlen=_WINDOW), _WINDOW
-        self.tops = TopTangents(first, view.camera, most=_TOPS)
+        self.tops = TopTangents(first, view.camera, most=_AGAIN)
         self.direction: PoseDirection = (
             PoseDirection(first, view.camera, self.upright, view.roll_rad)
             if earlier is None
@@ -121,7 +120,7 @@ class _Compared:
             return float(np.degrees(atan2(line[0] * to[1] - line[1] * to[0], line @ to)))
 
         if abs(angle(before, distance_m or self._distance_m)) < _NARROW_DEG:
-            range_m = _SEEN_M if distance_m is None else distance_m * _SIZES
+            range_m = DISTANCES_M[[0, -1]] if distance_m is None else distance_m * _SIZES
             off = np.array([angle(ahead, away_m) for away_m in range_m])
             across = 0.0 if off.prod() <= 0.0 else np.abs(off).min()
             self.aside.see(max(across, self.direction.height.value))
@@ -238,7 +237,8 @@ class CameraAgreement:
             one.missing = _AGAIN
             one.turned.see(self._turn_of(one))
             roll_rad, stddev_rad = roll_of(one.tops.copy(), one.upright)
-            if np.degrees(stddev_rad) < _SURE_DEG:
+            # Three deviations are less than what is told.
+            if 3.0 * np.degrees(stddev_rad) < one.rolled.watch.limit:
                 one.rolled.see(float(np.degrees(roll_rad)))
 
     @property
