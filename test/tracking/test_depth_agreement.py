@@ -45,6 +45,14 @@ def test_a_jump_less_than_a_sensors_noise_is_none() -> None:
     assert surplus_of_jumps(silhouette(), depth(5.0, 5.11)) == 1.0
 
 
+def test_an_outline_that_is_wide_by_a_hundredth_of_the_image_still_shows_the_view() -> None:
+    mask, image = np.zeros((480, 640), np.uint8), np.full((480, 640), 3.0)
+    mask[100:, 240:400] = 255
+    image[108:, 248:392] = 2.0
+    surplus = surplus_of_jumps(mask, image)
+    assert surplus is not None and surplus > 0.9
+
+
 def test_without_depth_there_is_no_verdict() -> None:
     nothing = np.zeros(SHAPE, np.float32)
     assert surplus_of_jumps(silhouette(), nothing) is None

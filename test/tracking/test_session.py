@@ -121,6 +121,20 @@ def test_without_a_number_all_who_come_are_tracked(detected: Detect) -> None:
     assert counts == [1, 1, 2, 2]
 
 
+def test_six_people_are_the_most() -> None:
+    Session([BODY], CAMERA, default_preset(), people=6)
+    with pytest.raises(ValueError, match="expected a number up to 6"):
+        Session([BODY], CAMERA, default_preset(), people=7)
+
+
+@pytest.mark.parametrize(("wide_px", "count"), [(2, 0), (5, 1)])
+def test_a_pole_of_less_than_a_hundredth_of_the_image_is_nobody(wide_px: int, count: int) -> None:
+    pole = np.zeros((CAMERA.height, CAMERA.width), np.uint8)
+    pole[:, 200 : 200 + wide_px] = 255
+    people = scene(None, 0).people
+    assert [len(people.track(Observation(pole))) for _ in range(4)][-1] == count
+
+
 def test_somebody_who_walks_past_another_keeps_the_identity(detected: Detect) -> None:
     show = scene(detected)
     for i in range(25):
