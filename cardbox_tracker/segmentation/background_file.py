@@ -38,8 +38,6 @@ _CHROMA_MEAN, _CHROMA_STDDEV = "chroma_mean", "chroma_stddev"
 _SIZE, _K, _DISTORTION, _DISTORTION_MODEL = "size", "k", "distortion", "distortion_model"
 _NEEDED = (_FORMAT, _MEAN, _STDDEV, _SIZE, _K, _DISTORTION, _DISTORTION_MODEL)
 _COLOR = (_CHROMA_MEAN, _CHROMA_STDDEV)
-# Longest list of numbers of an entry, and bytes of a number; a text may have as many bytes.
-_MOST_NUMBERS, _LARGEST_NUMBER = 32, 8
 _MAGIC, _HEADER = b"\x93NUMPY\x01\x00", struct.Struct("<8sH")
 _WRITTEN = re.compile(
     r"\{'descr': '(?P<kind><(?:[if][48]|U\d{1,6}))', 'fortran_order': (?P<order>True|False), "
@@ -106,12 +104,12 @@ def load_background(path: str | os.PathLike[str], most: tuple[int, int]) -> Stor
     )
     with foreign(path, BackgroundFileError, expected):
         with regular_file(path) as file:
-            arrays = _read(file, 2 * most[0] * most[1])
+            # Working images have about as many pixels in each of two views, and fewer colours.
+            arrays = _read(file, 2 * np.float64().nbytes * most[0] * most[1])
         return _checked(arrays, most)
 
 
-def _read(file: BinaryIO, pixels: int) -> dict[str, NDArray[Any]]:
-    most = {_MEAN: pixels, _STDDEV: pixels, _CHROMA_MEAN: 3 * pixels, _CHROMA_STDDEV: 3 * pixels}
+def _read(file: BinaryIO, most_bytes: int) -> dict[str, NDArray[Any]]:
     arrays: dict[str, NDArray[Any]] = {}
     with zipfile.ZipFile(file) as archive:
         names = {info.filename.removesuffix(".npy"): info for info in archive.infolist()}
@@ -122,12 +120,12 @@ def _read(file: BinaryIO, pixels: int) -> dict[str, NDArray[Any]]:
             if names[key].compress_type not in (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED):
                 raise ValueError(f"'{key}' is compressed in a way that NumPy does not use")
             with archive.open(names[key]) as entry:
-                arrays[key] = _array(entry, key, most.get(key, _MOST_NUMBERS))
+                arrays[key] = _array(entry, key, most_bytes)
     return arrays
 
 
-def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
-    """Return the array of an entry with at most ``most`` numbers, which is checked first."""
+def _array(entry: IO[bytes], key: str, most_bytes: int) -> NDArray[Any]:
+    """Return the array of an entry with at most so many bytes, which is checked first."""
     begin = entry.read(_HEADER.size)
     if len(begin) < _HEADER.size or not begin.startswith(_MAGIC):
         raise ValueError(f"'{key}' is not in version 1.0 of NumPy's format")
@@ -139,7 +137,7 @@ def _array(entry: IO[bytes], key: str, most: int) -> NDArray[Any]:
     kind = np.dtype(header["kind"])
     shape = tuple(int(side) for side in header["shape"].split(",") if side.strip())
     count = math.prod(shape)
-    if count * kind.itemsize > _LARGEST_NUMBER * most:
+    if count * kind.itemsize > most_bytes:
         raise ValueError(
             f"'{key}' has the shape {shape} and type {kind}, too much for a background of this size"
         )
