@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cardbox_tracker.segmentation.scene_motion import SceneMotion
@@ -19,6 +20,12 @@ def moved(images: list[Any]) -> float:
 
 def test_an_empty_scene_is_still(room: Any) -> None:
     assert moved([room.image() for _ in range(IMAGES)]) <= STILL / 2
+
+
+def test_an_empty_scene_before_a_noisy_camera_is_still(room: Any) -> None:
+    rng = np.random.default_rng(3)
+    noisy = [room.image() + rng.normal(0, 10, (120, 160)) for _ in range(IMAGES)]
+    assert moved([np.clip(image, 0, 255).astype(np.uint8) for image in noisy]) <= STILL
 
 
 @pytest.mark.parametrize("change", [0.7, 1.3])
