@@ -19,11 +19,12 @@ from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.detectors.detector import Detector, KeptDetections
 from cardbox_tracker.detectors.point_table import PointTable
 from cardbox_tracker.detectors.pose_network import silhouette_of
+from cardbox_tracker.person.model import PLACEMENT
 from cardbox_tracker.recordings.bag_reader import IMAGE_TYPES, BagReader
 from cardbox_tracker.recordings.open_images import ImageRecording
 from cardbox_tracker.recordings.silhouettes import PreparedImage, RecordedFrame, SilhouetteSource
 from cardbox_tracker.segmentation.learning import Learning, PersonInViewLearning
-from cardbox_tracker.segmentation.silhouettes import WITHIN_LIMITS_M, nearest_m, silhouette_within
+from cardbox_tracker.segmentation.silhouettes import nearest_m, silhouette_within
 
 
 def depth_images(
@@ -62,7 +63,7 @@ class DepthSilhouetteSource(SilhouetteSource):
         points: Detector | PointTable | None = None,
     ) -> None:
         """Prepare to read; see :class:`SilhouetteSource`, and CardboxError for a wrong limit."""
-        least_m, most_m = WITHIN_LIMITS_M
+        least_m, most_m, *_ = PLACEMENT["distance_m"]
         if not least_m <= within.metres <= most_m:
             raise CardboxError(
                 f"the limit of the depth is {within.metres:g} m; expected {least_m:g} to "

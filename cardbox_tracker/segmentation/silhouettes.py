@@ -131,9 +131,6 @@ class SilhouettePipeline:
         return float(np.median(brightness_of(image) - self._extractor.model.mean))
 
 
-WITHIN_LIMITS_M = 0.3, 20.0
-"""Range of the limit of the depth, metres."""
-
 # Unknown pixels between near ones belong to the person: a depth camera measures nothing at edges
 # and where only one of its eyes sees.
 _GAP = 1 / 64

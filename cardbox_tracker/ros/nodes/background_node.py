@@ -14,6 +14,7 @@ from cardbox_tracker.camera.stamps import StampOrder
 from cardbox_tracker.common.errors import BackgroundFileError, CameraError
 from cardbox_tracker.common.health import WATCHES
 from cardbox_tracker.common.progress import told
+from cardbox_tracker.person.model import PLACEMENT
 from cardbox_tracker.ros.messages import conversions
 from cardbox_tracker.ros.nodes.camera_images import CameraImages, SilhouetteOutputs
 from cardbox_tracker.ros.nodes.depth_input import DepthCut
@@ -34,7 +35,7 @@ from cardbox_tracker.segmentation.background_config import BackgroundConfig
 from cardbox_tracker.segmentation.background_file import background_path
 from cardbox_tracker.segmentation.kept_background import KeptBackground
 from cardbox_tracker.segmentation.learning import WAYS
-from cardbox_tracker.segmentation.silhouettes import WITHIN_LIMITS_M, SilhouettePipeline, nearest_m
+from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline, nearest_m
 
 # The default shared-memory segment of Fast DDS holds half a megabyte, less its own data.
 _LARGE_IMAGE_BYTES = 400_000
@@ -60,7 +61,7 @@ class BackgroundParameters(NodeParameters, BackgroundConfig):
         "with depth images: pixels nearer than this are the person, and nothing has to be "
         "learned; choose a distance between the person and the wall; 0: learn the empty scene",
         unit="m",
-        limits=(0.0, WITHIN_LIMITS_M[1]),
+        limits=(0.0, PLACEMENT["distance_m"][1]),
     )
     depth: str = depth_parameter()
     learning: str = parameter(
