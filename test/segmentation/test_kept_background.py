@@ -64,6 +64,14 @@ def test_a_restart_with_somebody_in_view_goes_on_at_the_first_image(
         assert iou(restarted, room, at, image) == pytest.approx(expected, abs=0.02)
 
 
+def test_a_restart_goes_on_while_a_lamp_at_one_side_is_off(path: Path, room: Any) -> None:
+    lamp = 0.88 - 0.28 * np.exp(-((np.arange(160) / 160 - 0.1) ** 2) / 0.2)
+    image = (lamp * room.image(80.0, sway_px=0)).astype(np.uint8)
+    restarted = pipeline()
+    assert KeptBackground(path, SIZE).resume(restarted, image)
+    assert iou(restarted, room, 80.0, image) > 0.85
+
+
 def test_a_moved_camera_is_refused_until_it_is_back(path: Path, room: Any) -> None:
     kept, restarted = KeptBackground(path, SIZE), pipeline()
     with pytest.raises(BackgroundFileError, match=r"moved.*background/learn"):
