@@ -30,6 +30,13 @@ def test_who_stands_or_moves_slowly_or_otherwise_shows_no_lag() -> None:
     assert lag_of(np.full((40, 5), np.nan), MOVES[:40], 8) is None
 
 
+@pytest.mark.parametrize(("known", "lag"), [(9, None), (14, 3)])
+def test_a_few_heights_show_no_lag(known: int, lag: int | None) -> None:
+    here = MOVES[10:50, :1].copy()
+    here[known:] = np.nan
+    assert lag_of(here, MOVES[7:47, :1], 8) == lag
+
+
 def test_a_lag_lasts_while_nobody_moves_and_ends_with_the_clock() -> None:
     lag, told = MotionLag(), []
     for i in range(300):

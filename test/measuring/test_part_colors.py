@@ -19,7 +19,7 @@ from cardbox_tracker.person.appearance import FOREARM, HAND, HEAD, LEGS, TORSO, 
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.kinematics import pose
 from cardbox_tracker.person.model import BodyModel
-from cardbox_tracker.person.posture import reference_posture
+from cardbox_tracker.person.posture import ROLL, TORSO_Y, reference_posture
 
 SHIRT, SKIN, SLEEVE = (150, 60, 30), (110, 150, 210), (30, 160, 40)
 BODY = BodyModel.of(distance_m=2.0)
@@ -78,13 +78,15 @@ def test_one_image_of_any_posture_teaches_colours_in_more_light_and_in_less() ->
     np.testing.assert_allclose(appearance.histograms[FOREARM], mixture, rtol=0.05)
 
 
-def test_the_posture_really_held_is_found() -> None:
-    asked = reference_posture("arms")
-    held = asked.copy()
+@pytest.mark.parametrize(("aside_m", "roll_rad"), [(0.0, 0.0), (0.04, 0.0), (0.0, 0.09)])
+def test_the_posture_really_held_is_found(aside_m: float, roll_rad: float) -> None:
+    held = reference_posture("arms")
     held[[4, 8]] += np.radians((-12.0, 8.0))
+    held[[TORSO_Y, ROLL]] += aside_m, roll_rad
     silhouette = render(cardbox_patches(BODY, held), CAMERA)
-    found = fit_posture(BODY, CAMERA, silhouette, "arms")
-    assert np.degrees(np.abs(found - held)[[4, 8]]).max() < 3.0
+    for seed in range(4):
+        off = np.abs(fit_posture(BODY, CAMERA, silhouette, "arms", seed) - held)
+        assert np.degrees(off[[4, 8, ROLL]]).max() < 3.0 and off[TORSO_Y] < 0.01
 
 
 @pytest.mark.parametrize("depth_m", [1e-5, 1e-9, -1e-5, -0.1])
