@@ -39,10 +39,8 @@ _BORDER_PX = 4.0
 _HEIGHT_PX, _HALF_PX = 0.1, 4.0
 # Largest effective number of frames, since neighbouring frames are correlated.
 _COUNTED = 150
-# Roll: most steps, height with a quarter of the weight, least noise; fewest heights and largest
-# condition number.
-_ROLL_STEPS, _ROLL_HALF_PX, _LEAST_NOISE_PX = 4, 2.0, 0.3
-_FEWEST, _LARGEST_CONDITION = 8, 1e6
+# Most steps to a roll, and fewest heights that show one.
+_ROLL_STEPS, _FEWEST = 4, 8
 
 # Images as they come, mirrored, and upside down: what becomes of columns and rows about the middle.
 _FLIPS = np.array([np.diag((1.0, 1.0)), np.diag((-1.0, 1.0)), np.diag((-1.0, -1.0))])
@@ -149,15 +147,15 @@ def roll_of(tangents: TopTangents, extrinsics: Extrinsics) -> tuple[float, float
         moved = [tangents.heights(_turned(now, step)) for step in DIFFERENCE * np.eye(2)]
         slopes = (np.column_stack(moved) - heights[:, None]) / DIFFERENCE
         known = np.isfinite(slopes).all(axis=1)
-        return geman_mcclure(heights[known][None], slopes[known][None], _ROLL_HALF_PX)
+        return geman_mcclure(heights[known][None], slopes[known][None], _HALF_PX)
 
     found = minimize({"tops": tops}, np.zeros((1, 2)), rules_of(2), _ROLL_STEPS)
     turn, information = found.values[0], found.information[0]
     heights = tangents.heights(_turned(extrinsics, turn))
     heights = heights[np.isfinite(heights)]
-    if len(heights) < _FEWEST or np.linalg.cond(information) > _LARGEST_CONDITION:
+    if len(heights) < _FEWEST or np.linalg.matrix_rank(information) < len(information):
         return 0.0, float("inf")
-    noise_px = max(_LEAST_NOISE_PX, 1.48 * float(np.median(np.abs(heights))))
+    noise_px = max(_HEIGHT_PX, 1.48 * float(np.median(np.abs(heights))))
     return float(turn[1]), noise_px * float(np.sqrt(np.linalg.inv(information)[1, 1]))
 
 

@@ -140,8 +140,9 @@ def test_a_roll_is_told_from_a_turn_up_by_heights_at_several_places(degrees: flo
 
 
 def test_of_somebody_who_stands_still_no_roll_is_known() -> None:
-    frames = sightings([np.append(reference_posture("front"), [0.0, 0.0])] * 3)
-    assert roll_of(tangents_of(frames), TRUE)[1] == np.inf
+    for count in (3, 30):
+        frames = sightings([np.append(reference_posture("front"), [0.0, 0.0])] * count)
+        assert roll_of(tangents_of(frames), TRUE)[1] == np.inf
     assert roll_of(TopTangents(CAMERA, OTHER), TRUE)[1] == np.inf
 
 
