@@ -122,6 +122,15 @@ def test_a_silhouette_that_is_cut_off_says_nothing() -> None:
     assert tangents_of([Sighting(frame.state, frame.first, nobody)]).heights(TRUE).size == 0
 
 
+@pytest.mark.parametrize(("row", "is_whole"), [(3, False), (5, True)])
+def test_a_top_within_four_pixels_of_the_border_may_be_cut_off(row: int, is_whole: bool) -> None:
+    (frame,) = sightings([np.append(reference_posture("front"), [0.0, 0.0])])
+    top = int(np.flatnonzero(frame.other.any(axis=1))[0])
+    higher = np.roll(frame.other, row - top, axis=0)
+    tangents = tangents_of([Sighting(frame.state, frame.first, higher)])
+    assert np.isfinite(tangents.heights(TRUE)).all() == is_whole
+
+
 def test_with_tangents_a_roll_is_found() -> None:
     wrong = moved_by(TRUE, np.array([0.0, 0.0, np.radians(4.0), 0.0, 0.0, 0.0]))
     frames = sightings(waving(8))
@@ -432,6 +441,14 @@ def test_joints_in_both_images_tell_a_wrong_pose_or_focal_length(
         found.see(nobody, nobody, joints_in_both())
     assert found.joints.value == pytest.approx(height_deg, abs=0.2)
     assert found.joints.holds == (height_deg > 0.0)
+
+
+@pytest.mark.parametrize(("known", "is_told"), [(3, False), (5, True)])
+def test_four_joints_in_both_images_tell_a_pose(known: int, is_told: bool) -> None:
+    one, other = joints_in_both()
+    one = replace(one, scores=1.0 * (np.arange(17) < known))
+    apart_deg = PoseDirection(CAMERA, OTHER, TRUE, 0.0).joints_deg(one, other)
+    assert (apart_deg is not None) == is_told
 
 
 def test_a_few_frames_and_empty_images_say_nothing() -> None:

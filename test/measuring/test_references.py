@@ -14,6 +14,8 @@ from cardbox_tracker.measuring.references import (
     check_reference,
     check_references,
     lateral_m,
+    rounded_down,
+    rounded_up,
 )
 from cardbox_tracker.person.cardbox import cardbox_patches
 from cardbox_tracker.person.model import BodyModel
@@ -43,6 +45,11 @@ def block(rows: slice, columns: slice) -> np.ndarray:
 @pytest.mark.parametrize("torso_y_m", [-0.1, 0.0, 0.1])
 def test_good_references_pass(side_turn: str, torso_y_m: float) -> None:
     check_references({name: seen(name, torso_y_m, side_turn) for name in REFERENCE_NAMES})
+
+
+def test_what_has_two_digits_is_not_rounded() -> None:
+    """In binary, 29 hundredths are less than that, and 7 are more."""
+    assert (rounded_down(0.29), rounded_up(0.07)) == ("0.29", "0.07")
 
 
 def test_the_average_is_the_majority() -> None:

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from cardbox_tracker.camera.camera import Camera
 from cardbox_tracker.measuring.skeleton import Skeleton
-from cardbox_tracker.measuring.stature import CROWN_TO_SHOULDER, SPAN, height_of_row_m, stature_m
+from cardbox_tracker.measuring.stature import height_of_row_m, stature_m
 
 CAMERA = Camera(320, 240, 330.0, 330.0, 159.5, 119.5)
 # 3.3 px a centimetre at 1 m, so 1 px is a centimetre at 3.3 m.
@@ -30,10 +30,10 @@ def skeleton(stature_m: float, crown_row: int = 30) -> Skeleton:
     crown_m = height_of_row_m(CAMERA, crown_row - 0.5, DISTANCE_M)
     return Skeleton(
         shoulder_breadth_m=0.2 * stature_m,
-        shoulder_height_m=crown_m - CROWN_TO_SHOULDER * stature_m,
+        shoulder_height_m=crown_m - 0.218 * stature_m,
         upper_arm_m=0.16 * stature_m,
         forearm_m=0.21 * stature_m,
-        span_m=SPAN * stature_m,
+        span_m=1.005 * stature_m,
     )
 
 
