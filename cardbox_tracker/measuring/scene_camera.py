@@ -19,7 +19,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cardbox_tracker.camera.camera import Camera
+from cardbox_tracker.camera.camera import WORKING_SIZE, Camera
 from cardbox_tracker.camera.encodings import brightness_of
 from cardbox_tracker.detectors.image_points import ImagePoints
 from cardbox_tracker.measuring.camera_turns import blurred
@@ -61,11 +61,9 @@ _TOLD = np.radians(4.0)
 # A shift of most of the background between two images that shows that the camera moves, as a share
 # of the longer side; pairs of images with such a shift, and points that show it.
 _SHIFT, _SHIFTED_PAIRS, _LEAST_POINTS = 0.01, 0.25, 12
-# Longer side of images whose textures are compared, deviations of the blurs between which texture
-# is, px, and the grey values beyond which it is an edge; share of an image that both show.
-_TEXTURE_PX, _TEXTURE_STDDEVS_PX, _MOST_GREY, _SHARED = 320, (1.5, 6.0), 6.0, 0.2
-# Half of the width of the peak of their correlation, px, which is this much higher than all others.
-_PEAK_PX, _CLEARER = 8, 1.2
+# Deviation of the blur that leaves no texture, px; standard deviations above which the peak of the
+# textures' correlation is none of noise.
+_TEXTURE_PX, _CLEARER = 6.0, 7.0
 # Deviation of the pitch of a camera that moves, rad, with which nothing is sure; margin around
 # people, share of their height.
 _MOVING, _AROUND = np.radians(12.0), 0.15
@@ -352,34 +350,22 @@ def _texture_shift(
 ) -> float | None:
     """Return :func:`background_shift` by all pixels, for walls without points that are found again.
 
-    It is where the textures of both images correlate most (D. Padfield, "Masked object registration
-    in the Fourier domain", 2012); None if they correlate nearly as much elsewhere.
+    It is where the textures of both images correlate most; None if they do so by chance.
     """
-    scale, rough = _TEXTURE_PX / max(free.shape), cv2.INTER_NEAREST
+    scale, rough = WORKING_SIZE[0] / max(free.shape), cv2.INTER_NEAREST
     mask = np.asarray(cv2.resize(free, None, fx=scale, fy=scale, interpolation=rough)) > 0
-    size = 2 * mask.shape[0], 2 * mask.shape[1]
 
-    def texture(image: NDArray[np.uint8]) -> FloatArray:
+    def spectrum(image: NDArray[np.uint8]) -> NDArray[np.complex128]:
         small = cv2.resize(brightness_of(image), mask.shape[::-1], interpolation=cv2.INTER_AREA)
-        fine, coarse = (blurred(np.asarray(small), mask, stddev) for stddev in _TEXTURE_STDDEVS_PX)
-        return np.where(mask, np.clip(fine - coarse, -_MOST_GREY, _MOST_GREY), 0.0)
+        # Edges of a person who moves count no more than a rough wall.
+        texture = np.sign(small - blurred(np.asarray(small), mask, _TEXTURE_PX))
+        return np.fft.rfft2(np.where(mask, texture, 0.0))
 
-    def products(one: FloatArray, other: FloatArray) -> FloatArray:
-        spectra = np.fft.rfft2(one, size), np.conj(np.fft.rfft2(other, size))
-        return np.fft.irfft2(spectra[0] * spectra[1], size)
-
-    first, last, inside = texture(before), texture(after), mask.astype(np.float64)
-    shared = products(inside, inside)
-    power = products(last**2, inside) * products(inside, first**2)
-    alike = products(last, first) * np.sqrt(np.maximum(shared, 0.0) / np.maximum(power, 1e-9))
-    alike[shared < _SHARED * mask.size] = 0.0
-    peak = np.unravel_index(np.argmax(alike), size)
-    beside = np.roll(alike, np.subtract(_PEAK_PX, peak), axis=(0, 1))
-    beside[: 2 * _PEAK_PX + 1, : 2 * _PEAK_PX + 1] = 0.0
-    if alike[peak] <= _CLEARER * beside.max():
+    alike = np.fft.irfft2(spectrum(after) * np.conj(spectrum(before)), mask.shape)
+    if alike.max() <= _CLEARER * alike.std():
         return None
-    shift = (np.array(peak) + mask.shape) % size - mask.shape
-    return float(np.linalg.norm(shift)) / _TEXTURE_PX
+    peak = np.array(np.unravel_index(np.argmax(alike), mask.shape))
+    return float(np.linalg.norm(np.minimum(peak, mask.shape - peak))) / WORKING_SIZE[0]
 
 
 def _cover(free: NDArray[np.uint8], points: ImagePoints, camera: Camera) -> None:
