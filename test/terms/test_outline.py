@@ -105,7 +105,7 @@ def test_distances_of_camera_poses_are_of_every_fourth_pixel_around_the_person()
     seen = SeenOutline(silhouette, camera, np.array([0.0, 25.0 / 150.0, 2.0]))
     # 24 px at the sides and above.
     assert seen.distances.size == (24 + 100 + 24) // 4 * ((24 + 80) // 4)
-    # A patch whose edges lie within the outer pixels paints them all, so it is half a pixel smaller.
+    # A patch whose edges lie within the outer pixels paints them all: it is half a pixel smaller.
     corners = [(99.75, 59.75), (199.25, 59.75), (199.25, 179.25), (99.75, 179.25)]
     there = [((u - 159.5) / 150.0, (v - 119.5) / 150.0, 2.0) for u, v in corners]
     near = np.abs(seen.distances) < 8.0
