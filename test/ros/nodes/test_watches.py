@@ -564,7 +564,7 @@ CASES = [
     Case("aside", 0.4, 0.8, aside, ending=0.2),
     Case("late", 0.1, 0.2, late),
     Case("other motion", 0.53, 0.47, other_motion, lasting=0.56, ending=0.64),
-    Case("rolled", 1.4, 1.6, of_extrinsics("rolled")),
+    Case("rolled", 1.9, 2.1, of_extrinsics("rolled")),
     Case("other view", 29, 20, other_view, lasting=30, ending=40),
     Case("distance", 1.85, 2.05, distance, lasting=1.1, ending=0.9),
     Case("back", 0.2, 0.3, back, lasting=0.2, ending=0.1),
