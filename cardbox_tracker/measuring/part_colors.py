@@ -7,7 +7,7 @@
    the hands hang beside or in front of the trousers.
 3. Histograms are smoothed over neighbouring colours and mixed with a uniform distribution.
 4. Half of the hand's histogram is the face's, because hands are often missing in the outline.
-5. A part without pixels gets the colours of a similar part: legs and forearms (sleeves) those
+5. A part with too few pixels gets the colours of a similar part: legs and forearms (sleeves) those
    of the torso, hands those of the face.
 
 Without references, one image of any posture teaches the colours of head, torso and legs. Forearms
@@ -59,6 +59,8 @@ LEARNED_FROM = ("front", "arms")
 # Additional label for the skin of the face, and its share in the histogram of the hand.
 _FACE = len(PARTS)
 _FACE_SHARE = 0.5
+# Least number of pixels from which a part is learned.
+_MIN_PX = 40
 # Factors on the light in which one image of a part is counted, because limbs that move are lit
 # otherwise than in that image, and the forearm otherwise than the face.
 _LIGHTS = (0.7, 0.85, 1.0, 1.2, 1.4)
@@ -121,7 +123,7 @@ def seen_appearance(
     labels = part_labels(body, camera, posture, silhouette)
     channels = 1 if image.ndim == 2 else 3
     torso = image.reshape(-1, channels)[labels.ravel() == TORSO]
-    if not len(torso) or not (labels == _FACE).any():
+    if len(torso) < _MIN_PX or np.count_nonzero(labels == _FACE) < _MIN_PX:
         return None
     brightness = np.median(torso, axis=0)
     counts = np.zeros((len(PARTS) + 1, bins_of(channels)))
@@ -143,7 +145,7 @@ def _histograms(counts: FloatArray, channels: int) -> FloatArray:
     """Return histograms (5, bins) from counts (6, bins); the last row counts the face."""
     counts[HEAD] += counts[_FACE]
     for part, instead in ((LEGS, TORSO), (_FACE, HEAD), (HAND, _FACE), (FOREARM, TORSO)):
-        if not counts[part].any():
+        if counts[part].sum() < _MIN_PX:
             counts[part] = counts[instead]
     histograms = _smoothed(counts, channels)
     histograms[HAND] = (1 - _FACE_SHARE) * histograms[HAND] + _FACE_SHARE * histograms[_FACE]

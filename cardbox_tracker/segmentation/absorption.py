@@ -23,6 +23,8 @@ FloatImage = NDArray[np.float32]
 ImageArray = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
 
+# A pixel has changed if it differs by more than this multiple of the noise.
+_TIMES_NOISE = 4.0
 # Images a mean is computed from; this many reduce the noise to a quarter.
 _BLOCK = 15
 # Images that follow the last one used in less time are skipped, since nobody sways that fast.
@@ -75,7 +77,7 @@ class StillRegions:
         if self._before is None:
             self._before, self._still = now, np.ones(now.shape, np.int32)
         else:
-            changed = changed_pixels(self._before, now)
+            changed = changed_pixels(self._before, now, _TIMES_NOISE)
             self._still = np.where(changed, 1, self._still + 1)
             self._before = np.where(changed, now, self._before)
         things = self._things()

@@ -28,8 +28,8 @@ FloatImage = NDArray[np.float32]
 # Tiles along the width, and the search radius as a share of a tile's size.
 _TILES = 8
 _REACH = 0.25
-# Smallest correlation of a found tile.
-_FOUND = 0.6
+# Smallest correlation of a found tile, and the gain that a shifted place needs.
+_FOUND, _BETTER = 0.6, 0.05
 # Smaller shifts are ignored, px.
 _SAME_PX = 1
 # Share of the tiles that must be found in place, and least number of tiles for a decision.
@@ -112,8 +112,12 @@ def _find(
     around = image[top - up : top + height + reach, left - back : left + width + reach]
     scores = cv2.matchTemplate(np.ascontiguousarray(around), tile, cv2.TM_CCOEFF_NORMED)
     best_v, best_u = np.unravel_index(int(np.argmax(scores)), scores.shape)
-    if scores[best_v, best_u] < _FOUND:
+    best = float(scores[best_v, best_u])
+    if best < _FOUND:
         return None
+    # Many places along an edge correlate equally well.
+    if float(scores[up, back]) >= best - _BETTER:
+        return 0, 0
     return int(best_u) - back, int(best_v) - up
 
 

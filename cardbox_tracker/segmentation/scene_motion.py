@@ -70,7 +70,9 @@ def _small(brightness: ImageArray) -> FloatImage:
     return np.asarray(cv2.GaussianBlur(small, (0, 0), SMOOTHING_PX), np.float32)
 
 
-def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
+def changed_pixels(
+    before: FloatImage, after: FloatImage, times_noise: float = _TIMES_NOISE
+) -> Mask:
     """Return a mask of pixels in which two images (h, w) differ by a multiple of their noise.
 
     The level of the light and the noise are medians, since moving pixels are less than half.
@@ -80,4 +82,4 @@ def changed_pixels(before: FloatImage, after: FloatImage) -> Mask:
     # Differences grow with the light.
     difference = np.asarray(np.abs(after - level * before) / max(level, 1.0), np.float32)
     noise = _FROM_MEDIAN * float(np.median(difference))
-    return np.asarray(difference > min(max(_LEAST, _TIMES_NOISE * noise), _MOST), np.bool_)
+    return np.asarray(difference > min(max(_LEAST, times_noise * noise), _MOST), np.bool_)

@@ -38,6 +38,8 @@ from cardbox_tracker.tracking.person_region import PersonRegion
 _AWAY = 0.02
 # Least jump, m, and share of the depth by which a sensor's noise may exceed it.
 _JUMP_M, _JUMP_SHARE = 0.06, 0.02
+# Fewest pairs of an image that count, and largest number that are compared.
+_LEAST_PAIRS, _MOST_PAIRS = 20, 120
 # Images between samples.
 _EVERY = 3
 # Points of a figure by their rows in :func:`projected`.
@@ -61,7 +63,7 @@ def surplus_of_jumps(silhouette: Silhouette, depth_m: DepthImage) -> float | Non
         for one in (depth_m[at[:, 1], at[:, 0]] for at in (inner, outer))
     )
     nearer = np.minimum(here, there)
-    if not (nearer < np.inf).any():
+    if np.count_nonzero(nearer < np.inf) < _LEAST_PAIRS:
         return None
     jump_m = np.maximum(_JUMP_M, _JUMP_SHARE * nearer)
     grows, shrinks = there > here + jump_m, here > there + jump_m
@@ -81,8 +83,9 @@ def _pairs(silhouette: Silhouette) -> tuple[NDArray[np.int64], NDArray[np.int64]
     along = np.roll(outline, -reach, axis=0) - np.roll(outline, reach, axis=0)
     length = np.hypot(along[:, 0], along[:, 1])
     outward = np.column_stack([-along[:, 1], along[:, 0]]) / np.maximum(length, 1e-9)[:, None]
-    inner = np.rint(outline - away * outward).astype(np.int64)
-    outer = np.rint(outline + away * outward).astype(np.int64)
+    some = slice(None, None, max(1, len(outline) // _MOST_PAIRS))
+    inner = np.rint(outline[some] - away * outward[some]).astype(np.int64)
+    outer = np.rint(outline[some] + away * outward[some]).astype(np.int64)
     last = np.array([width - 1, height - 1])
     is_inside = ((inner >= 0) & (inner <= last) & (outer >= 0) & (outer <= last)).all(axis=1)
     inner, outer = inner[is_inside], outer[is_inside]

@@ -11,7 +11,8 @@ import pytest
 from cardbox_tracker.camera.camera import Calibration
 from cardbox_tracker.common.errors import BackgroundFileError
 from cardbox_tracker.segmentation.background_config import BackgroundConfig
-from cardbox_tracker.segmentation.kept_background import KeptBackground
+from cardbox_tracker.segmentation.empty_scene import BackgroundModel
+from cardbox_tracker.segmentation.kept_background import KeptBackground, compare_scene
 from cardbox_tracker.segmentation.learning import StillLearning
 from cardbox_tracker.segmentation.silhouettes import SilhouettePipeline
 
@@ -62,6 +63,15 @@ def test_a_restart_with_somebody_in_view_goes_on_at_the_first_image(
         expected = iou(never_stopped, room, at, image)
         assert expected > 0.9
         assert iou(restarted, room, at, image) == pytest.approx(expected, abs=0.02)
+
+
+def test_a_tile_along_an_edge_stays_where_it_is() -> None:
+    """It correlates as well higher and lower, so noise would choose."""
+    edge = np.where(np.arange(160) < 70, 60.0, 160.0) * np.ones((120, 1))
+    mean, stddev = edge.astype(np.float32), np.ones((120, 160), np.float32)
+    noisy = edge + np.random.default_rng(0).normal(0, 4, edge.shape)
+    fit = compare_scene(BackgroundModel(mean, stddev), noisy.astype(np.uint8))
+    assert (fit.in_place, fit.shifted) == (6, 0)
 
 
 def test_a_restart_goes_on_while_a_lamp_at_one_side_is_off(path: Path, room: Any) -> None:
